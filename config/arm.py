@@ -1,0 +1,105 @@
+"""An arm and its tool: kinematics, masses, limits, servo. One file per arm type in config/arms."""
+
+from typing import Annotated
+
+from msgspec import Meta
+
+from config.values import Angle, Length, Mass, Name, NonNegative, Point, Positive, Section, Span
+
+__all__ = ["ArmConfig", "Capsule", "Joint", "MotionLimits", "Servo", "Tool"]
+
+
+class Joint(Section, kw_only=True):
+    """One row of the Denavit-Hartenberg table (standard convention, as UR publishes it) and its limits."""
+
+    name: Name
+    a_m: Length
+    d_m: Length
+    alpha_rad: Angle
+    mass_kg: Mass
+    com_m: Point
+    """Centre of mass in the link's DH frame."""
+    range_rad: tuple[Angle, Angle]
+    speed_rad_s: Annotated[float, Meta(gt=0.0, le=10.0)]
+    acceleration_rad_s2: Annotated[float, Meta(gt=0.0, le=100.0)]
+    jerk_rad_s3: Annotated[float, Meta(gt=0.0, le=10_000.0)]
+    torque_nm: Annotated[float, Meta(gt=0.0, le=1000.0)]
+
+
+class Capsule(Section, kw_only=True):
+    """A collision capsule in a link's DH frame. Link 0 is the base, link i moves with joint i."""
+
+    link: Annotated[int, Meta(ge=0, le=6)]
+    from_m: Point
+    to_m: Point
+    radius_m: Span
+
+
+class Servo(Section, kw_only=True):
+    """UR's servoj smoothing. Lag follows robot.servo.lag_s of these two and the dead time."""
+
+    lookahead_s: Annotated[float, Meta(ge=0.03, le=0.2)]
+    gain: Annotated[float, Meta(ge=100.0, le=2000.0)]
+    dead_time_s: Annotated[float, Meta(ge=0.0, le=0.05)]
+
+
+class Tool(Section, kw_only=True):
+    """A parallel-jaw gripper on the flange, approach axis +z of the flange, jaws along its y axis."""
+
+    name: Name
+    mass_kg: Mass
+    com_m: Point
+    tcp_m: Point
+    """Tool centre point in the flange frame: between the pads."""
+    stroke_m: Annotated[float, Meta(gt=0.0, le=0.3)]
+    force_n: tuple[Positive, Positive]
+    """Least and greatest grip force."""
+    grip_force_n: Positive
+    """Force used when closing."""
+    speed_m_s: tuple[Positive, Positive]
+    pad_size_m: tuple[Span, Span, Span]
+    """Full size of a pad: along the jaws, across, along the approach axis."""
+    finger_depth_m: Span
+    """Free finger length above the tool centre point before the palm begins."""
+    tip_below_tcp_m: Span
+    """How far the fingertips reach past the tool centre point."""
+
+
+class MotionLimits(Section, kw_only=True):
+    """How a Heading becomes motion, and the basic limits that the gate holds."""
+
+    step_s: Annotated[float, Meta(ge=0.01, le=1.0)] = 0.05
+    max_step_m: Annotated[float, Meta(gt=0.0, le=0.1)] = 0.022
+    leash_m: Span = 0.09
+    """How far the target may run ahead of the measured tool."""
+    guard_height_m: Span = 0.17
+    """Below this height over the table the tool moves at guarded speed."""
+    guarded_speed_m_s: Annotated[float, Meta(gt=0.0, le=0.5)] = 0.15
+    contact_force_n: Positive = 20.0
+    """Force on the tool at which a descent is stopped and reported as contact."""
+    heights_m: tuple[Span, Span] = (0.025, 0.22)
+    """Lowest and travel height of the tool centre point over the table."""
+    workspace_m: tuple[Point, Point]
+    """Corners of the box that the tool centre point may be in, base frame."""
+    table_clearance_m: NonNegative = 0.004
+    """The fingertips may not be commanded lower than this over the table."""
+    intent_max_age_s: Positive = 0.1
+    state_max_age_s: Positive = 0.05
+    tracking_error_rad: Positive = 0.25
+    force_limit_n: Positive = 250.0
+    """Measured force on the tool above which the gate refuses."""
+
+
+class ArmConfig(Section, kw_only=True):
+    """One arm with its tool."""
+
+    name: Name
+    joints: tuple[Joint, Joint, Joint, Joint, Joint, Joint]
+    capsules: tuple[Capsule, ...]
+    servo: Servo
+    tool: Tool
+    motion: MotionLimits
+    home_rad: tuple[Angle, Angle, Angle, Angle, Angle, Angle]
+    """A tool-down pose over the table, used to seed inverse kinematics."""
+    tool_yaw_rad: Angle = 0.0
+    """Turn of the tool about the vertical while working with Heading intents."""

@@ -1,0 +1,133 @@
+"""How a learner learns: every reading of the paper is a key here. Presets lie in config/learning."""
+
+from typing import Annotated
+from typing import Literal as OneOf
+
+from msgspec import Meta
+
+from config.values import Name, NonNegative, Positive, Section, Share
+
+__all__ = [
+    "Actions",
+    "Experiment",
+    "Expert",
+    "ForwardModel",
+    "GoalSelection",
+    "LearningConfig",
+    "Novelty",
+    "SubgoalSelection",
+]
+
+Count = Annotated[int, Meta(ge=1, le=1_000_000)]
+Rate = Annotated[float, Meta(gt=0.0, le=1.0)]
+
+
+class GoalSelection(Section, kw_only=True):
+    """The bandit over goals, once an epoch."""
+
+    temperature: Positive = 0.02
+    ema_rate: Rate = 0.3
+    window: Annotated[int, Meta(ge=2, le=100)] = 10
+    """PT of equation (1)."""
+    improvement: OneOf["printed", "clipped_success", "absolute"] = "printed"
+    """Competence improvement: equation (1) as printed; clipped difference of mean successes; absolute difference."""
+    prediction: OneOf["expert_utility", "running_success"] = "expert_utility"
+    """Who predicts CP: the expert's utility at the trial's start, or the running success of the goal."""
+    credit: OneOf["subgoal", "main_goal"] = "subgoal"
+    """Which goal an attempt is credited to."""
+    probability_floor: Share = 0.0
+    """Least total probability spread evenly over all goals, so that mastered goals are still looked at."""
+    rearm: bool = False
+    """Raise a goal's value again when what it was believed to need has changed or it begins to fail."""
+
+
+class SubgoalSelection(Section, kw_only=True):
+    """The choice of sub-goals, once a trial."""
+
+    kind: OneOf["q", "q_hindsight", "graph"] = "graph"
+    temperature: OneOf["one_minus_improvement", "one_minus_competence", "fixed"] = "one_minus_competence"
+    temperature_least: Positive = 0.01
+    temperature_scale: NonNegative = 0.59
+    competence_window: Count = 20
+    known_context: bool = False
+    """A failure counts only if the sub-goal was once achieved from this goal-state."""
+    alpha: Rate = 0.1
+    gamma: Share = 0.6
+    dyna_replays: Annotated[int, Meta(ge=0, le=10_000)] = 20
+    dyna_buffer: Count = 200
+    max_literals: Annotated[int, Meta(ge=0, le=4)] = 3
+    literal_cost: NonNegative = 1.2
+    """Prior of a conjunction is exp(-cost * literals)."""
+    hazard: Share = 0.01
+    """Chance per attempt that the preconditions were drawn anew: the change detector."""
+    false_positive: Share = 0.02
+    """Chance that a goal is achieved although its preconditions do not hold."""
+    use_blocked_only: bool = True
+    """Only trials that reached the place but were blocked are evidence against."""
+
+
+class Expert(Section, kw_only=True):
+    """The utility model of one goal."""
+
+    hidden: Annotated[tuple[Count, ...], Meta(min_length=1, max_length=4)] = (64, 64)
+    learning_rate: Positive = 1e-3
+    batch: Count = 128
+    updates_per_trial: Annotated[int, Meta(ge=0, le=10_000)] = 20
+    trace: Count = 70
+    """Longest part of a trial, counted back from its end, that is learnt from."""
+    buffer_steps: Count = 20_000
+    established_after: Count = 10
+    """Successes after which the expert alone moves the arm."""
+
+
+class Novelty(Section, kw_only=True):
+    """Exploration before there is something to exploit: go where P(t) is unlike the recent past."""
+
+    memory: Count = 200
+    temperature: Positive = 0.05
+
+
+class ForwardModel(Section, kw_only=True):
+    """Who predicts P(t+1) of a candidate move."""
+
+    kind: OneOf["geometric", "learned"] = "geometric"
+    hidden: Annotated[tuple[Count, ...], Meta(min_length=1, max_length=4)] = (128, 128)
+    history: Annotated[int, Meta(ge=1, le=20)] = 4
+    learning_rate: Positive = 1e-3
+
+
+class Actions(Section, kw_only=True):
+    """Candidate moves rated at each time step."""
+
+    n_headings: Count = 20
+    distance_shares: Annotated[tuple[Share, ...], Meta(min_length=1, max_length=8)] = (1.0, 0.35)
+    """Step lengths as shares of the longest step."""
+
+
+class Experiment(Section, kw_only=True):
+    """Epochs, trials and time steps, as the paper has them."""
+
+    epochs: Count = 2000
+    trials: Count = 8
+    steps: Count = 70
+    evaluate_every: Count = 50
+    test_epochs: Count = 10
+    """Test epochs a goal at each evaluation."""
+    dense_every: Count = 10
+    dense_for: Annotated[int, Meta(ge=0)] = 0
+    """Evaluate every dense_every epochs for this many epochs after the start and after each change of rules."""
+    checkpoint_every: Count = 50
+
+
+class LearningConfig(Section, kw_only=True):
+    """One learner and its protocol."""
+
+    name: Name
+    description: str = ""
+    experiment: Experiment = Experiment()
+    goal_selection: GoalSelection = GoalSelection()
+    subgoal_selection: SubgoalSelection = SubgoalSelection()
+    expert: Expert = Expert()
+    novelty: Novelty = Novelty()
+    forward_model: ForwardModel = ForwardModel()
+    actions: Actions = Actions()

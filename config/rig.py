@@ -1,0 +1,35 @@
+"""A rig: which plant, which perception, which arm file. Implementations are named as import strings."""
+
+from typing import Annotated
+
+from msgspec import Meta
+
+from config.values import Name, Section
+
+__all__ = ["PlantExpected", "Rig"]
+
+ImportString = Annotated[str, Meta(pattern=r"^[a-z_][a-z0-9_.]*:[A-Za-z_][A-Za-z0-9_]*$")]
+
+
+class PlantExpected(Section, kw_only=True):
+    """What the plant must say it is before anything is armed."""
+
+    kind: Annotated[str, Meta(pattern=r"^(real|virtual|twin|fake)$")]
+    model: str
+    serial: str
+
+
+class Rig(Section, kw_only=True):
+    """The same processes, one way of three."""
+
+    name: Name
+    description: str = ""
+    arm: str
+    """A shipped arm's name or a path to a file."""
+    plant: ImportString
+    perception: ImportString
+    operator: ImportString | None = None
+    """Who arms the station where no hardware is attached; refused by a real arm."""
+    expected: PlantExpected
+    tick_s: Annotated[float, Meta(ge=0.002, le=0.05)] = 0.01
+    physics_s: Annotated[float, Meta(ge=0.0005, le=0.01)] = 0.002

@@ -1,0 +1,1 @@
+"""Percept to decision: goals, sub-goals, experts."""

@@ -1,0 +1,1 @@
+"""Everything that touches time, wires or motors; knows nothing of goals."""

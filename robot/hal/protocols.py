@@ -1,0 +1,87 @@
+"""The doors to a world: Plant, Arm, Camera, truth, resetter. Consumers own these; implementations do not inherit."""
+
+from collections.abc import Mapping
+from typing import Protocol
+
+from robot.messages import ArmCommand, ArmSpec, ArmState, PlantIdentity, SceneState
+
+__all__ = ["Arm", "Camera", "Clock", "Frame", "Plant", "Resetter", "SceneTruth"]
+
+
+class Clock(Protocol):
+    """The arm's time. Waiting sleeps on a real arm and advances physics on the twin."""
+
+    def now_ns(self) -> int:
+        """Return the monotonic time of the arm in nanoseconds."""
+        ...
+
+    def wait_tick(self) -> int:
+        """Wait for the next tick of the absolute grid and return how many ticks were missed."""
+        ...
+
+
+class Frame(Protocol):
+    """One camera image; its type is fixed by the camera room."""
+
+    stamp_ns: int
+
+
+class Camera(Protocol):
+    """A source of frames."""
+
+    def read(self, now_ns: int) -> Frame | None:
+        """Return the newest frame delivered by now_ns, or None."""
+        ...
+
+
+class SceneTruth(Protocol):
+    """Ground truth of a simulated world."""
+
+    def read(self) -> SceneState:
+        """Return the poses of everything the scenario names."""
+        ...
+
+
+class Resetter(Protocol):
+    """Brings the table back to a drawn start: teleport on a twin, a person or the arm itself elsewhere."""
+
+    def reset(self, *, seed: int, epoch: int) -> None:
+        """Lay the table out for an epoch. Clears no latch by itself."""
+        ...
+
+
+class Arm(Protocol):
+    """One arm with its hand and its digital inputs and outputs."""
+
+    spec: ArmSpec
+    clock: Clock
+
+    def connect(self) -> None:
+        """Acquire the arm. Never moves arm or fingers, never stops a program."""
+        ...
+
+    def read(self) -> ArmState:
+        """Return the newest state. Raises StaleStateError past its deadline."""
+        ...
+
+    def write(self, command: ArmCommand) -> None:
+        """Send one command. Only the gate calls this."""
+        ...
+
+    def stop(self) -> bool:
+        """Stop and hold the grip; return whether the plant confirmed. Idempotent, never raises."""
+        ...
+
+    def close(self) -> None:
+        """Release the arm. Idempotent, never raises."""
+        ...
+
+
+class Plant(Protocol):
+    """One world, real or simulated; a rig names exactly one."""
+
+    identity: PlantIdentity
+    arm: Arm
+    cameras: Mapping[str, Camera]
+    truth: SceneTruth | None
+    resetter: Resetter
