@@ -296,6 +296,8 @@ class StationSpec(Message, kw_only=True):
 
     n_distances: int
     n_buttons: int
+    distance_names: tuple[str, ...]
+    """What each d_j is measured to, as named in Percept.objects; `table` is the table top. For geometric prediction only."""
     step_s: float
     max_step_m: float
     heights_m: tuple[float, float]
