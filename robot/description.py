@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from config.arm import ArmConfig, Joint
 from robot.appearance import dress_arm, dress_tool
 
-__all__ = ["arm_model", "arm_spec", "dh_constant", "forward_kinematics", "tool_transform", "write_mjcf"]
+__all__ = ["arm_model", "arm_spec", "dh_constant", "forward_kinematics", "tool_down", "tool_transform", "write_mjcf"]
 
 Array = NDArray[np.float64]
 
@@ -35,6 +35,12 @@ def tool_transform(arm: ArmConfig) -> Array:
     T_ft = np.eye(4)
     T_ft[:3, 3] = arm.tool.tcp_m
     return T_ft
+
+
+def tool_down(yaw_rad: float) -> Array:
+    """Return R_bt of a tool that points straight down; at yaw 0 its jaws move along the base's y axis.  () -> (3, 3)"""
+    c, s = np.cos(yaw_rad), np.sin(yaw_rad)
+    return np.array([[c, s, 0.0], [s, -c, 0.0], [0.0, 0.0, -1.0]])
 
 
 def forward_kinematics(arm: ArmConfig, q_rad: tuple[float, ...] | Array, *, frame: str = "tcp") -> Array:
