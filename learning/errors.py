@@ -1,0 +1,23 @@
+"""Errors of the learning package, in families by who must act."""
+
+__all__ = ["CheckpointError", "LearningError", "RunFolderError", "TooManyVoidEpochsError", "WorkerError"]
+
+
+class LearningError(Exception):
+    """Root of everything this package raises on purpose."""
+
+
+class RunFolderError(LearningError, ValueError):
+    """A run folder is not what the command needs: name another one, or resume."""
+
+
+class CheckpointError(LearningError):
+    """A checkpoint is torn, of another kind, or holds what it may not hold."""
+
+
+class WorkerError(LearningError):
+    """An evaluation worker broke: the run goes on without it."""
+
+
+class TooManyVoidEpochsError(LearningError):
+    """Epoch after epoch was cut short: a person must look at the plant."""
