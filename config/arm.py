@@ -9,7 +9,7 @@ from config.values import Angle, Length, Mass, Name, NonNegative, Point, Positiv
 __all__ = ["ArmConfig", "Capsule", "Joint", "MotionLimits", "Servo", "Tool"]
 
 
-class Joint(Section, kw_only=True):
+class Joint(Section, frozen=True, kw_only=True):
     """One row of the Denavit-Hartenberg table (standard convention, as UR publishes it) and its limits."""
 
     name: Name
@@ -26,7 +26,7 @@ class Joint(Section, kw_only=True):
     torque_nm: Annotated[float, Meta(gt=0.0, le=1000.0)]
 
 
-class Capsule(Section, kw_only=True):
+class Capsule(Section, frozen=True, kw_only=True):
     """A collision capsule in a link's DH frame. Link 0 is the base, link i moves with joint i."""
 
     link: Annotated[int, Meta(ge=0, le=6)]
@@ -35,7 +35,7 @@ class Capsule(Section, kw_only=True):
     radius_m: Span
 
 
-class Servo(Section, kw_only=True):
+class Servo(Section, frozen=True, kw_only=True):
     """UR's servoj smoothing. Lag follows robot.servo.lag_s of these two and the dead time."""
 
     lookahead_s: Annotated[float, Meta(ge=0.03, le=0.2)]
@@ -43,7 +43,7 @@ class Servo(Section, kw_only=True):
     dead_time_s: Annotated[float, Meta(ge=0.0, le=0.05)]
 
 
-class Tool(Section, kw_only=True):
+class Tool(Section, frozen=True, kw_only=True):
     """A parallel-jaw gripper on the flange, approach axis +z of the flange, jaws along its y axis."""
 
     name: Name
@@ -65,7 +65,7 @@ class Tool(Section, kw_only=True):
     """How far the fingertips reach past the tool centre point."""
 
 
-class MotionLimits(Section, kw_only=True):
+class MotionLimits(Section, frozen=True, kw_only=True):
     """How a Heading becomes motion, and the basic limits that the gate holds."""
 
     step_s: Annotated[float, Meta(ge=0.01, le=1.0)] = 0.05
@@ -90,7 +90,7 @@ class MotionLimits(Section, kw_only=True):
     """Measured force on the tool above which the gate refuses."""
 
 
-class ArmConfig(Section, kw_only=True):
+class ArmConfig(Section, frozen=True, kw_only=True):
     """One arm with its tool."""
 
     name: Name

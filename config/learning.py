@@ -22,7 +22,7 @@ Count = Annotated[int, Meta(ge=1, le=1_000_000)]
 Rate = Annotated[float, Meta(gt=0.0, le=1.0)]
 
 
-class GoalSelection(Section, kw_only=True):
+class GoalSelection(Section, frozen=True, kw_only=True):
     """The bandit over goals, once an epoch."""
 
     temperature: Positive = 0.02
@@ -41,7 +41,7 @@ class GoalSelection(Section, kw_only=True):
     """Raise a goal's value again when what it was believed to need has changed or it begins to fail."""
 
 
-class SubgoalSelection(Section, kw_only=True):
+class SubgoalSelection(Section, frozen=True, kw_only=True):
     """The choice of sub-goals, once a trial."""
 
     kind: OneOf["q", "q_hindsight", "graph"] = "graph"
@@ -66,7 +66,7 @@ class SubgoalSelection(Section, kw_only=True):
     """Only trials that reached the place but were blocked are evidence against."""
 
 
-class Expert(Section, kw_only=True):
+class Expert(Section, frozen=True, kw_only=True):
     """The utility model of one goal."""
 
     hidden: Annotated[tuple[Count, ...], Meta(min_length=1, max_length=4)] = (64, 64)
@@ -80,14 +80,14 @@ class Expert(Section, kw_only=True):
     """Successes after which the expert alone moves the arm."""
 
 
-class Novelty(Section, kw_only=True):
+class Novelty(Section, frozen=True, kw_only=True):
     """Exploration before there is something to exploit: go where P(t) is unlike the recent past."""
 
     memory: Count = 200
     temperature: Positive = 0.05
 
 
-class ForwardModel(Section, kw_only=True):
+class ForwardModel(Section, frozen=True, kw_only=True):
     """Who predicts P(t+1) of a candidate move."""
 
     kind: OneOf["geometric", "learned"] = "geometric"
@@ -96,7 +96,7 @@ class ForwardModel(Section, kw_only=True):
     learning_rate: Positive = 1e-3
 
 
-class Actions(Section, kw_only=True):
+class Actions(Section, frozen=True, kw_only=True):
     """Candidate moves rated at each time step."""
 
     n_headings: Count = 20
@@ -104,7 +104,7 @@ class Actions(Section, kw_only=True):
     """Step lengths as shares of the longest step."""
 
 
-class Experiment(Section, kw_only=True):
+class Experiment(Section, frozen=True, kw_only=True):
     """Epochs, trials and time steps, as the paper has them."""
 
     epochs: Count = 2000
@@ -119,7 +119,7 @@ class Experiment(Section, kw_only=True):
     checkpoint_every: Count = 50
 
 
-class LearningConfig(Section, kw_only=True):
+class LearningConfig(Section, frozen=True, kw_only=True):
     """One learner and its protocol."""
 
     name: Name

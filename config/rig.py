@@ -11,7 +11,7 @@ __all__ = ["PlantExpected", "Rig"]
 ImportString = Annotated[str, Meta(pattern=r"^[a-z_][a-z0-9_.]*:[A-Za-z_][A-Za-z0-9_]*$")]
 
 
-class PlantExpected(Section, kw_only=True):
+class PlantExpected(Section, frozen=True, kw_only=True):
     """What the plant must say it is before anything is armed."""
 
     kind: Annotated[str, Meta(pattern=r"^(real|virtual|twin|fake)$")]
@@ -19,7 +19,7 @@ class PlantExpected(Section, kw_only=True):
     serial: str
 
 
-class Rig(Section, kw_only=True):
+class Rig(Section, frozen=True, kw_only=True):
     """The same processes, one way of three."""
 
     name: Name

@@ -5,7 +5,7 @@ from typing import Annotated
 
 from msgspec import Meta
 
-from config.values import Angle, Colour, Length, Mass, Name, Section, Span
+from config.values import Colour, Length, Mass, Name, Section, Span
 
 __all__ = [
     "Box",
@@ -26,7 +26,7 @@ Planar = tuple[Length, Length]
 Spread = tuple[Annotated[float, Meta(ge=0.0, le=0.5)], Annotated[float, Meta(ge=0.0, le=0.5)]]
 
 
-class Table(Section, kw_only=True):
+class Table(Section, frozen=True, kw_only=True):
     """The table top, base frame."""
 
     centre_m: Planar = (0.45, 0.0)
@@ -35,7 +35,7 @@ class Table(Section, kw_only=True):
     colour: Colour = (0.72, 0.66, 0.58)
 
 
-class Button(Section, kw_only=True):
+class Button(Section, frozen=True, kw_only=True):
     """An illuminated sprung dome button. Its travel closes a digital input, its lamp is a digital output."""
 
     name: Name
@@ -50,7 +50,7 @@ class Button(Section, kw_only=True):
     lamp_output: Annotated[int, Meta(ge=0, le=15)]
 
 
-class Lid(Section, kw_only=True):
+class Lid(Section, frozen=True, kw_only=True):
     """Two leaves on hinges, driven by one digital output: on opens, off shuts and locks."""
 
     output: Annotated[int, Meta(ge=0, le=15)]
@@ -60,7 +60,7 @@ class Lid(Section, kw_only=True):
     """Greatest force at a leaf's free edge."""
 
 
-class Box(Section, kw_only=True):
+class Box(Section, frozen=True, kw_only=True):
     """An open-topped box fixed to the table, with or without a driven lid."""
 
     name: Name
@@ -75,7 +75,7 @@ class Box(Section, kw_only=True):
     """Digital input of a sensor that sees something lying in the box."""
 
 
-class Cylinder(Section, kw_only=True):
+class Cylinder(Section, frozen=True, kw_only=True):
     """A loose cylinder, standing in a box or on the table."""
 
     name: Name
@@ -102,7 +102,7 @@ class GoalKind(StrEnum):
     IN_BOX = "in_box"
 
 
-class Goal(Section, kw_only=True):
+class Goal(Section, frozen=True, kw_only=True):
     """A goal, judged on the percept. The learner knows only its index."""
 
     name: Name
@@ -112,7 +112,7 @@ class Goal(Section, kw_only=True):
     """For in_box: which box."""
 
 
-class RuleSpan(Section, kw_only=True):
+class RuleSpan(Section, frozen=True, kw_only=True):
     """A rule set and the epoch from which it is in force."""
 
     from_epoch: Annotated[int, Meta(ge=0)]
@@ -120,14 +120,14 @@ class RuleSpan(Section, kw_only=True):
     """A shipped rule set's name or a path to a file."""
 
 
-class Start(Section, kw_only=True):
+class Start(Section, frozen=True, kw_only=True):
     """Where the tool centre point starts an epoch: a box it is drawn from, base frame."""
 
     position_m: tuple[Length, Length, Length] = (0.42, 0.0, 0.22)
     spread_m: tuple[Span, Span, Span] = (0.06, 0.1, 0.01)
 
 
-class Reflexes(Section, kw_only=True):
+class Reflexes(Section, frozen=True, kw_only=True):
     """Reflexes of the hand: given, not learnt."""
 
     close_on_object: bool = True
@@ -140,14 +140,14 @@ class Reflexes(Section, kw_only=True):
     """How far an object must have been lifted before it may be put down on the table."""
 
 
-class Evaluation(Section, kw_only=True):
+class Evaluation(Section, frozen=True, kw_only=True):
     """How far the tool may be off for a place to count as reached."""
 
     reach_radius_m: Span = 0.015
     reach_height_m: Span = 0.02
 
 
-class Scenario(Section, kw_only=True):
+class Scenario(Section, frozen=True, kw_only=True):
     """One table with its wiring over epochs and its goals."""
 
     name: Name

@@ -18,7 +18,10 @@ class TrialOutcome(StrEnum):
 
     ACHIEVED = "achieved"
     BLOCKED = "blocked"
-    """The tool was at the sub-goal's place, hand free for it, and the goal did not come about: evidence of a missing precondition."""
+    """The tool was at the sub-goal's place, hand free for it, and the goal did not come about.
+
+    That is evidence of a missing precondition.
+    """
     NOT_REACHED = "not_reached"
     """The tool never came to the place: evidence about the skill only."""
     VOID = "void"
@@ -45,10 +48,18 @@ class Attempt(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class SubgoalSelector(Protocol):
-    """Chooses the sub-goal of each trial. State_dicts hold None, bool, int, float, str, list, dict and numpy arrays only."""
+    """Chooses the sub-goal of each trial.
 
-    def select(self, *, goal: int, state: GoalState, available: tuple[bool, ...], temperature: float, explore: bool) -> int:
-        """Return a sub-goal index among the available ones. Without explore: the best, no randomness, nothing changed."""
+    State_dicts hold None, bool, int, float, str, list, dict and numpy arrays only.
+    """
+
+    def select(
+        self, *, goal: int, state: GoalState, available: tuple[bool, ...], temperature: float, explore: bool
+    ) -> int:
+        """Return a sub-goal index among the available ones.
+
+        Without explore: the best, no randomness, nothing changed.
+        """
         ...
 
     def update(self, attempt: Attempt) -> None:
@@ -65,7 +76,10 @@ class SubgoalSelector(Protocol):
 
 
 class Experts(Protocol):
-    """All experts of a learner, one utility model a goal. Sees P(t), the shaped target and intents; goals are indices."""
+    """All experts of a learner, one utility model a goal.
+
+    Sees P(t), the shaped target and intents; goals are indices.
+    """
 
     def begin_trial(self, subgoal: int, percept: Percept, *, explore: bool) -> None:
         """Start a trial. With explore=False: greedy, draws nothing, changes nothing learnt."""

@@ -23,8 +23,8 @@ __all__ = [
     "Hold",
     "Intent",
     "JointTarget",
-    "ObjectPose",
     "ObjectPercept",
+    "ObjectPose",
     "Outcome",
     "Percept",
     "PlantIdentity",
@@ -64,7 +64,7 @@ class ArmMode(StrEnum):
     EMERGENCY_STOP = "emergency_stop"
 
 
-class GripState(Message, kw_only=True):
+class GripState(Message, frozen=True, kw_only=True):
     """What the hand measured."""
 
     opening_m: float
@@ -74,7 +74,7 @@ class GripState(Message, kw_only=True):
     """Closing ended on something before the jaws met (the hand's object-detected flag)."""
 
 
-class ArmState(Message, kw_only=True):
+class ArmState(Message, frozen=True, kw_only=True):
     """What the arm measured at one instant, base frame, joints base to wrist 3."""
 
     stamp_ns: int
@@ -92,7 +92,7 @@ class ArmState(Message, kw_only=True):
     mode: ArmMode
 
 
-class ObjectPose(Message, kw_only=True):
+class ObjectPose(Message, frozen=True, kw_only=True):
     """Where one thing is."""
 
     name: str
@@ -100,7 +100,7 @@ class ObjectPose(Message, kw_only=True):
     quat: Quat
 
 
-class SceneState(Message, kw_only=True):
+class SceneState(Message, frozen=True, kw_only=True):
     """Ground truth of a simulated world: poses of everything the scenario names, in its order."""
 
     stamp_ns: int
@@ -110,7 +110,7 @@ class SceneState(Message, kw_only=True):
 # ------------------------------------------------------------------------------------------------------- percept
 
 
-class ObjectPercept(Message, kw_only=True):
+class ObjectPercept(Message, frozen=True, kw_only=True):
     """One object as perceived."""
 
     name: str
@@ -120,7 +120,7 @@ class ObjectPercept(Message, kw_only=True):
     is_valid: bool
 
 
-class Percept(Message, kw_only=True):
+class Percept(Message, frozen=True, kw_only=True):
     """The paper's P(t) = (d_1..d_n, s_1..s_m), plus what goals are judged on."""
 
     stamp_ns: int
@@ -149,7 +149,7 @@ class Grip(StrEnum):
     CLOSE = "close"
 
 
-class Heading(Message, tag="heading", kw_only=True):
+class Heading(Message, tag="heading", frozen=True, kw_only=True):
     """The paper's action: direction of movement and height of the arm."""
 
     heading_rad: float
@@ -161,7 +161,7 @@ class Heading(Message, tag="heading", kw_only=True):
     grip: Grip | None = None
 
 
-class Twist(Message, tag="twist", kw_only=True):
+class Twist(Message, tag="twist", frozen=True, kw_only=True):
     """A velocity of the tool centre point in the base frame, for as long as the step lasts."""
 
     linear_m_s: Vec3
@@ -169,14 +169,14 @@ class Twist(Message, tag="twist", kw_only=True):
     grip: Grip | None = None
 
 
-class JointTarget(Message, tag="joint_target", kw_only=True):
+class JointTarget(Message, tag="joint_target", frozen=True, kw_only=True):
     """Joint angles to go to."""
 
     q_rad: Vec6
     grip: Grip | None = None
 
 
-class Hold(Message, tag="hold", kw_only=True):
+class Hold(Message, tag="hold", frozen=True, kw_only=True):
     """Come to rest and stay."""
 
     grip: Grip | None = None
@@ -188,7 +188,7 @@ Intent = Heading | Twist | JointTarget | Hold
 # --------------------------------------------------------------------------------------------- command and verdict
 
 
-class GripCommand(Message, kw_only=True):
+class GripCommand(Message, frozen=True, kw_only=True):
     """What is asked of the hand."""
 
     opening_m: float
@@ -196,7 +196,7 @@ class GripCommand(Message, kw_only=True):
     speed_m_s: float
 
 
-class ArmCommand(Message, kw_only=True):
+class ArmCommand(Message, frozen=True, kw_only=True):
     """What is asked of the plant for one tick."""
 
     stamp_ns: int
@@ -214,7 +214,7 @@ class Outcome(StrEnum):
     REFUSED = "refused"
 
 
-class Verdict(Message, kw_only=True):
+class Verdict(Message, frozen=True, kw_only=True):
     """What safety said, by which rule and by how much."""
 
     stamp_ns: int
@@ -229,7 +229,7 @@ class Verdict(Message, kw_only=True):
     is_latched: bool = False
 
 
-class Executed(Message, kw_only=True):
+class Executed(Message, frozen=True, kw_only=True):
     """What was really carried out of an intent."""
 
     duration_s: float
@@ -253,7 +253,7 @@ class PlantKind(StrEnum):
     FAKE = "fake"
 
 
-class PlantIdentity(Message, kw_only=True):
+class PlantIdentity(Message, frozen=True, kw_only=True):
     """Which world this is; must match what the rig names before anything is armed."""
 
     kind: PlantKind
@@ -261,7 +261,7 @@ class PlantIdentity(Message, kw_only=True):
     serial: str
 
 
-class ArmSpec(Message, kw_only=True):
+class ArmSpec(Message, frozen=True, kw_only=True):
     """What can be known of an arm before connecting to it."""
 
     model: str
@@ -284,20 +284,23 @@ class StationMode(StrEnum):
     LATCHED = "latched"
 
 
-class StationState(Message, kw_only=True):
+class StationState(Message, frozen=True, kw_only=True):
     """A station's mode and, when latched, why."""
 
     mode: StationMode
     reason: str = ""
 
 
-class StationSpec(Message, kw_only=True):
+class StationSpec(Message, frozen=True, kw_only=True):
     """What a learner may know before the first step. It names no goal, rule or scenario."""
 
     n_distances: int
     n_buttons: int
     distance_names: tuple[str, ...]
-    """What each d_j is measured to, as named in Percept.objects; `table` is the table top. For geometric prediction only."""
+    """What each d_j is measured to, as named in Percept.objects; `table` is the table top.
+
+    For geometric prediction only.
+    """
     step_s: float
     max_step_m: float
     heights_m: tuple[float, float]
@@ -307,7 +310,7 @@ class StationSpec(Message, kw_only=True):
     table_height_m: float = 0.0
 
 
-class StepResult(Message, kw_only=True):
+class StepResult(Message, frozen=True, kw_only=True):
     """What one time step came to."""
 
     percept: Percept

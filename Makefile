@@ -1,0 +1,38 @@
+# make run | test | check | bench | clean
+PYTHON ?= python3.11
+VENV := .venv
+BIN := $(VENV)/bin
+STAMP := $(VENV)/.installed
+RUN := runs/main
+BENCHES := twin grasp learning
+
+.PHONY: run setup check test test-slow bench clean
+
+run: setup
+	$(BIN)/autotelic learn --scenario paper --rig twin --preset default --seed 0 --out $(RUN)
+
+setup: $(STAMP)
+
+$(STAMP): pyproject.toml constraints.txt
+	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[dev]'
+	touch $@
+
+check: setup
+	$(BIN)/ruff format --check .
+	$(BIN)/ruff check .
+	$(BIN)/pyright
+	$(BIN)/lint-imports
+
+test: check
+	$(BIN)/pytest
+
+test-slow: setup
+	$(BIN)/pytest -m slow
+
+bench: setup
+	@for name in $(BENCHES); do $(BIN)/autotelic bench $$name || exit 1; done
+
+clean:
+	rm -rf build dist *.egg-info .pytest_cache .ruff_cache .hypothesis .import_linter_cache
+	find config learning perception robot sim_twin tests -name __pycache__ -prune -exec rm -rf {} +

@@ -1,0 +1,89 @@
+"""The `autotelic` command: every sub-command is an entry point, imported only when it is called."""
+
+from collections.abc import Callable
+from importlib.metadata import EntryPoint, entry_points
+from typing import Any
+
+import typer
+from typer.core import TyperGroup
+
+from config.errors import ConfigError
+from robot.errors import RobotConfigError, RobotError
+
+__all__ = ["COMMAND_GROUP", "app", "main"]
+
+COMMAND_GROUP = "autotelic.commands"
+EXIT_FAILED = 1
+EXIT_USAGE = 2
+
+
+class EntryPointGroup(TyperGroup):
+    """A command group whose members are the entry points of `autotelic.commands`."""
+
+    def list_commands(self, ctx: Any) -> list[str]:  # noqa: ANN401, ARG002
+        """Return the names of all registered sub-commands."""
+        return sorted(_points())
+
+    def get_command(self, ctx: Any, cmd_name: str) -> Any:  # noqa: ANN401, ARG002
+        """Import and return one sub-command, None if there is none of that name."""
+        point = _points().get(cmd_name)
+        return None if point is None else _load(point)
+
+    def invoke(self, ctx: Any) -> Any:  # noqa: ANN401
+        """Run the sub-command; an error raised on purpose becomes one line and an exit code."""
+        try:
+            return super().invoke(ctx)
+        except (ConfigError, RobotConfigError) as error:
+            typer.echo(f"error: {error}", err=True)
+            raise typer.Exit(EXIT_USAGE) from error
+        except RobotError as error:
+            typer.echo(f"error: {error}", err=True)
+            raise typer.Exit(EXIT_FAILED) from error
+
+
+app = typer.Typer(
+    cls=EntryPointGroup,
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    help="A UR5e and its simulated twin that teach themselves a table of interdependent goals.",
+)
+
+
+@app.callback()
+def _root() -> None:
+    """Turn the Typer application into a group, whatever sub-commands there are."""
+
+
+def main() -> None:
+    """Run the command line."""
+    app()
+
+
+def _points() -> dict[str, EntryPoint]:
+    return {point.name: point for point in entry_points(group=COMMAND_GROUP)}
+
+
+def _load(point: EntryPoint) -> Any:  # noqa: ANN401
+    """Import what an entry point names, an application or one function, and make it a command of that name."""
+    try:
+        registered = point.load()
+    except ModuleNotFoundError as error:
+        registered = _unavailable(point.name, error)
+    if not isinstance(registered, typer.Typer):
+        single = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
+        single.command(name=point.name)(registered)
+        registered = single
+    command = typer.main.get_command(registered)
+    command.name = point.name
+    return command
+
+
+def _unavailable(name: str, error: ModuleNotFoundError) -> Callable[[], None]:
+    """Return a command that says which module is missing, so that the other sub-commands go on working."""
+
+    def say() -> None:
+        typer.echo(f"error: {name} cannot be loaded: {error}; is the extra that brings it installed?", err=True)
+        raise typer.Exit(EXIT_FAILED)
+
+    say.__doc__ = f"Not available: {error}."
+    return say

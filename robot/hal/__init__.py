@@ -1,0 +1,1 @@
+"""The doors to a world and what stands behind them."""

@@ -1,0 +1,1 @@
+"""From an intent to jerk-limited joint targets."""
