@@ -45,8 +45,8 @@ class SceneTruth(Protocol):
 class Resetter(Protocol):
     """Brings the table back to a drawn start: teleport on a twin, a person or the arm itself elsewhere."""
 
-    def reset(self, *, seed: int, epoch: int) -> None:
-        """Lay the table out for an epoch. Clears no latch by itself."""
+    def reset(self, *, seed: int, epoch: int, digital_out: int) -> None:
+        """Lay the table out for an epoch, lamps and lids as digital_out says. Clears no latch by itself."""
         ...
 
 
