@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from config.arm import ArmConfig, Joint
 from robot.appearance import dress_arm, dress_tool
 
-__all__ = ["arm_model", "arm_spec", "dh_constant", "forward_kinematics", "tool_down", "tool_transform", "write_mjcf"]
+__all__ = ["ARM_CONTACT", "FIXTURE_CONTACT", "GRIP_SOLIMP", "GRIP_SOLREF", "OBJECT_CONTACT", "arm_model", "arm_spec", "dh_constant", "forward_kinematics", "tool_down", "tool_transform", "write_mjcf"]
 
 Array = NDArray[np.float64]
 
@@ -22,6 +22,10 @@ Array = NDArray[np.float64]
 ARM_CONTACT = (1, 0)
 OBJECT_CONTACT = (2, 3)
 FIXTURE_CONTACT = (0, 3)
+# A hard, hardly creeping contact for gripping; a rubber foot under the fingers that gives some 8 N/mm.
+GRIP_SOLREF = (0.004, 1.0)
+GRIP_SOLIMP = (0.99, 0.999, 0.001, 0.5, 2.0)
+BUMPER_SOLREF = (0.035, 1.0)
 
 
 def dh_constant(joint: Joint) -> Array:
@@ -179,18 +183,20 @@ def _add_finger(palm: mujoco.MjsBody, arm: ArmConfig, name: str, side: float, ma
     contype, conaffinity = ARM_CONTACT
     common = {"contype": contype, "conaffinity": conaffinity, "mass": 0}
     y = side * thick / 2
+    inset = thick - 0.003  # bumper and back stand back from the pad's face, so that only the pad grips
+    y_inset = side * (thick - inset / 2)
     body.add_geom(
         name=f"pad_{name}", type=box, size=[wide / 2, thick / 2, tall / 2], pos=[0, y, tip_z - bumper - tall / 2],
-        condim=4, friction=[1.0, 0.01, 0.0001], solref=[0.004, 1.0], solimp=[0.95, 0.99, 0.001, 0.5, 2],
+        condim=4, friction=[0.1, 0.005, 0.0001], solref=GRIP_SOLREF, solimp=GRIP_SOLIMP,
         rgba=[0.13, 0.13, 0.14, 1], group=2, **common,
     )  # fmt: skip
     body.add_geom(
-        name=f"bumper_{name}", type=box, size=[wide / 2, thick / 2, bumper / 2], pos=[0, y, tip_z - bumper / 2],
-        condim=3, friction=[0.6, 0.01, 0.0001], solref=[0.02, 1.0], solimp=[0.2, 0.95, 0.01, 0.5, 2], priority=1,
+        name=f"bumper_{name}", type=box, size=[wide / 2, inset / 2, bumper / 2], pos=[0, y_inset, tip_z - bumper / 2],
+        condim=3, friction=[0.6, 0.01, 0.0001], solref=BUMPER_SOLREF, solimp=[0.2, 0.95, 0.01, 0.5, 2], priority=1,
         rgba=[0.30, 0.31, 0.33, 1], group=2, **common,
     )  # fmt: skip
     top, bottom = tool.tcp_m[2] - tool.finger_depth_m, tip_z - bumper - tall
     body.add_geom(
-        name=f"back_{name}", type=box, size=[wide / 2.6, thick / 2.4, (bottom - top) / 2],
-        pos=[0, y, (top + bottom) / 2], rgba=[0.22, 0.23, 0.25, 1], group=2, **common,
+        name=f"back_{name}", type=box, size=[wide / 2.6, inset / 2, (bottom - top) / 2],
+        pos=[0, y_inset, (top + bottom) / 2], rgba=[0.22, 0.23, 0.25, 1], group=2, **common,
     )  # fmt: skip

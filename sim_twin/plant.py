@@ -1,0 +1,275 @@
+"""The twin: the Plant door in front of MuJoCo, in lock-step."""
+
+import mujoco
+import numpy as np
+
+from config.arm import ArmConfig
+from config.rig import Rig
+from config.scenario import Scenario
+from robot.description import forward_kinematics
+from robot.errors import NotEngagedError, StaleStateError
+from robot.hal.protocols import Camera
+from robot.kinematics import Kinematics
+from robot.messages import (
+    ArmCommand,
+    ArmMode,
+    ArmSpec,
+    ArmState,
+    GripState,
+    ObjectPose,
+    PlantIdentity,
+    PlantKind,
+    Quat,
+    SceneState,
+    Vec3,
+)
+from sim_twin.layout import Layout, draw_layout
+from sim_twin.scene import build_scene
+from sim_twin.table import TableDrive
+
+__all__ = ["TwinArm", "TwinClock", "TwinPlant", "TwinResetter", "TwinTruth"]
+
+N_BITS = 16
+SETTLE_TICKS = 4
+HELD_GAP_M = 0.003
+STILL_M_S = 0.004
+
+
+class TwinWorld:
+    """Model, data and the table's drives: the one place where physics advances."""
+
+    def __init__(self, arm: ArmConfig, scenario: Scenario, rig: Rig) -> None:
+        self.arm, self.scenario, self.tick_s = arm, scenario, rig.tick_s
+        self.model = build_scene(arm, scenario, physics_s=rig.physics_s).compile()
+        self.data = mujoco.MjData(self.model)
+        self.table = TableDrive(self.model, scenario, tick_s=rig.tick_s)
+        self.n_substeps = round(rig.tick_s / rig.physics_s)
+        self.n_ticks = 0
+        self.digital_out = 0
+        self.opening_asked_m = arm.tool.stroke_m
+        self.opening_goal_m = arm.tool.stroke_m
+        self.grip_speed_m_s = arm.tool.speed_m_s[1]
+        self.grip_control = self.model.actuator("grip").id
+        self.joint_controls = np.array([self.model.actuator(j.name).id for j in arm.joints])
+        self.finger_addresses = [int(self.model.joint(f"finger_{s}").qposadr[0]) for s in ("left", "right")]
+
+    def advance(self) -> None:
+        """One tick: drives, then physics."""
+        step = self.grip_speed_m_s * self.tick_s
+        self.opening_asked_m += min(max(self.opening_goal_m - self.opening_asked_m, -step), step)
+        self.data.ctrl[self.grip_control] = self.opening_asked_m
+        self.table.drive(self.data, self.digital_out)
+        mujoco.mj_step(self.model, self.data, self.n_substeps)
+        self.n_ticks += 1
+
+    @property
+    def now_ns(self) -> int:
+        """Time since the world was made; runs on through resets."""
+        return round(self.n_ticks * self.tick_s * 1e9)
+
+    def put(self, layout: Layout, q_rad: tuple[float, ...], digital_out: int) -> None:
+        """Place everything (a reset): the only teleport there is."""
+        model, data, tool = self.model, self.data, self.arm.tool
+        mujoco.mj_resetData(model, data)
+        for name, (x, y) in layout.fixtures_m.items():
+            model.body(name).pos[:2] = (x, y)
+        for cylinder in self.scenario.cylinders:
+            standing = layout.cylinders[cylinder.name]
+            address = int(model.joint(cylinder.name).qposadr[0])
+            height = self.scenario.table.height_m + cylinder.height_m / 2
+            data.qpos[address : address + 3] = (*standing.position_m, height)
+            data.qpos[address + 3 : address + 7] = (np.cos(standing.yaw_rad / 2), 0, 0, np.sin(standing.yaw_rad / 2))
+        data.qpos[:6] = q_rad
+        data.ctrl[self.joint_controls] = q_rad
+        for address in self.finger_addresses:
+            data.qpos[address] = tool.stroke_m / 2
+        self.opening_asked_m = self.opening_goal_m = tool.stroke_m
+        self.digital_out = digital_out
+        self.table.put(data, digital_out)
+        mujoco.mj_forward(model, data)
+        _fill_history(model, data)
+
+
+def _fill_history(model: mujoco.MjModel, data: mujoco.MjData) -> None:
+    """Fill the delayed actuators' buffers with the present set-points, so that no zero is ever acted on."""
+    for i in range(model.nu):
+        n = int(model.actuator_history[i, 0])
+        if n:
+            times = data.time - model.opt.timestep * np.arange(n, 0, -1)
+            mujoco.mj_initCtrlHistory(model, data, i, times, np.full(n, data.ctrl[i]))
+
+
+class TwinClock:
+    """Lock-step: waiting for the next tick advances physics by one tick and never misses one."""
+
+    def __init__(self, world: TwinWorld) -> None:
+        self._world = world
+
+    def now_ns(self) -> int:
+        """Return simulated time in nanoseconds."""
+        return self._world.now_ns
+
+    def wait_tick(self) -> int:
+        """Advance one tick; return 0 missed."""
+        self._world.advance()
+        return 0
+
+
+class TwinArm:
+    """The arm, its hand and its inputs and outputs on the twin."""
+
+    def __init__(self, world: TwinWorld) -> None:
+        self._world = world
+        self.clock = TwinClock(world)
+        joints = world.arm.joints
+        self.spec = ArmSpec(
+            model=world.arm.name,
+            rate_hz=1.0 / world.tick_s,
+            n_inputs=N_BITS,
+            n_outputs=N_BITS,
+            q_min_rad=tuple(j.range_rad[0] for j in joints),
+            q_max_rad=tuple(j.range_rad[1] for j in joints),
+            qd_max_rad_s=tuple(j.speed_rad_s for j in joints),
+            grip_stroke_m=world.arm.tool.stroke_m,
+        )
+        self._is_connected = False
+        data, model = world.data, world.model
+        self._q, self._qd = data.qpos[:6], data.qvel[:6]
+        self._tcp = data.site_xpos[model.site("tcp").id]
+        self._tcp_body = data.xquat[model.body("tool").id]
+        sensor = model.sensor("tool_force")
+        self._force = data.sensordata[sensor.adr[0] : sensor.adr[0] + 3]
+        self._fingers = [data.qpos[a : a + 1] for a in world.finger_addresses]
+        self._finger_speeds = [
+            data.qvel[int(model.joint(f"finger_{s}").dofadr[0]) :][:1] for s in ("left", "right")
+        ]
+        self._has_object = False
+
+    def connect(self) -> None:
+        """Take the arm; nothing moves."""
+        self._is_connected = True
+
+    def read(self) -> ArmState:
+        """Return the state after the last tick."""
+        if not self._is_connected:
+            raise StaleStateError("twin arm: expected connect() before read(); nothing was read")
+        world = self._world
+        fx, fy, fz = self._force.tolist()
+        return ArmState(
+            stamp_ns=world.now_ns,
+            q_rad=tuple(self._q.tolist()),
+            qd_rad_s=tuple(self._qd.tolist()),
+            tcp_position_m=tuple(self._tcp.tolist()),
+            tcp_quat=tuple(self._tcp_body.tolist()),
+            tcp_force_n=(-fx, -fy, -fz),
+            grip=self._read_grip(),
+            digital_in=world.table.read_inputs(world.data),
+            digital_out=world.digital_out,
+            mode=ArmMode.RUNNING,
+        )
+
+    def _read_grip(self) -> GripState:
+        """Opening from the fingers; an object is what stalls a closing hand before its jaws meet."""
+        world = self._world
+        opening = float(self._fingers[0][0] + self._fingers[1][0])
+        speed = float(self._finger_speeds[0][0] + self._finger_speeds[1][0])
+        is_still = abs(speed) < STILL_M_S
+        is_pressing = opening - world.opening_asked_m > HELD_GAP_M and opening > HELD_GAP_M
+        # Once held, a short stir of the fingers is not a loss; meeting jaws or an opening hand is.
+        self._has_object = is_pressing and (is_still or self._has_object)
+        return GripState(opening_m=opening, is_moving=not is_still, has_object=self._has_object)
+
+    def write(self, command: ArmCommand) -> None:
+        """Set the servo targets, the hand's target and the outputs for the next tick."""
+        if not self._is_connected:
+            raise NotEngagedError("twin arm: expected connect() before write(); nothing moved")
+        world = self._world
+        world.data.ctrl[world.joint_controls] = command.q_rad
+        grip = command.grip
+        world.opening_goal_m = grip.opening_m
+        world.grip_speed_m_s = grip.speed_m_s
+        world.model.actuator_forcerange[world.grip_control] = (-grip.force_n, grip.force_n)
+        world.digital_out = command.digital_out
+
+    def stop(self) -> bool:
+        """Hold where the arm is; the hand keeps its force."""
+        world = self._world
+        world.data.ctrl[world.joint_controls] = self._q
+        return True
+
+    def close(self) -> None:
+        """Release the arm."""
+        self._is_connected = False
+
+
+class TwinTruth:
+    """Poses of everything the scenario names, straight from the physics."""
+
+    def __init__(self, world: TwinWorld) -> None:
+        self._world = world
+        scenario, model = world.scenario, world.model
+        self._entries = [
+            (e.name, model.body(e.name).id, model.body(f"{e.name}_cap").id if e in scenario.buttons else None)
+            for e in (*scenario.buttons, *scenario.boxes, *scenario.cylinders)
+        ]
+
+    def read(self) -> SceneState:
+        """Return poses in the scenario's order: buttons (their caps), boxes (centre of the floor), cylinders."""
+        data = self._world.data
+        return SceneState(
+            stamp_ns=self._world.now_ns,
+            objects=tuple(
+                ObjectPose(
+                    name=name,
+                    position_m=_vec3(data.xpos[body if cap is None else cap]),
+                    quat=_quat(data.xquat[body]),
+                )
+                for name, body, cap in self._entries
+            ),
+        )
+
+
+class TwinResetter:
+    """Teleports the table to a drawn start. The same seed and epoch are the same table."""
+
+    def __init__(self, world: TwinWorld, kinematics: Kinematics) -> None:
+        self._world, self._kinematics = world, kinematics
+
+    def reset(self, *, seed: int, epoch: int, digital_out: int) -> None:
+        """Draw and place a layout, put the lids where the outputs say, and let everything settle."""
+        world = self._world
+        layout = draw_layout(world.scenario, np.random.default_rng([seed, epoch]))
+        q_rad = self._kinematics.solve(layout.start_m, world.arm.home_rad)
+        world.put(layout, q_rad, digital_out)
+        for _ in range(SETTLE_TICKS):
+            world.advance()
+
+
+class TwinPlant:
+    """A world in MuJoCo: one arm, one table."""
+
+    def __init__(self, *, arm: ArmConfig, scenario: Scenario, rig: Rig) -> None:
+        self._world = TwinWorld(arm, scenario, rig)
+        self.identity = PlantIdentity(kind=PlantKind.TWIN, model=arm.name, serial="twin")
+        self.arm = TwinArm(self._world)
+        self.cameras: dict[str, Camera] = {}
+        self.truth = TwinTruth(self._world)
+        self.resetter = TwinResetter(self._world, Kinematics(arm))
+        self._world.put(
+            draw_layout(scenario, np.random.default_rng(0)), arm.home_rad, digital_out=0
+        )
+
+    @property
+    def world(self) -> TwinWorld:
+        """Model and data, for pictures and benches."""
+        return self._world
+
+
+def _vec3(array: np.ndarray) -> Vec3:
+    x, y, z = array.tolist()
+    return x, y, z
+
+
+def _quat(array: np.ndarray) -> Quat:
+    w, x, y, z = array.tolist()
+    return w, x, y, z

@@ -1,0 +1,203 @@
+"""The simulated table as an MjSpec, from the arm's file and the scenario's.
+
+Everything is a body with mass and contacts: buttons are sprung slides, lids are leaves on hinges driven by weak
+actuators and locked by a joint equality only when shut, cylinders are free bodies. Nothing is ever welded.
+"""
+
+import mujoco
+
+from config.arm import ArmConfig
+from config.scenario import Box, Button, Cylinder, Scenario
+from robot.description import FIXTURE_CONTACT, GRIP_SOLIMP, GRIP_SOLREF, OBJECT_CONTACT, arm_spec
+from robot.servo import lag_s
+
+__all__ = ["LEAF_THICKNESS_M", "build_scene", "leaf_names"]
+
+LEAF_THICKNESS_M = 0.005
+SERVO_STIFFNESS = (20_000.0, 20_000.0, 20_000.0, 4_000.0, 4_000.0, 4_000.0)  # Nm/rad: droop stays under 0.5 mm
+FINGER_STIFFNESS = 6_000.0  # N/m
+_BOX = mujoco.mjtGeom.mjGEOM_BOX
+_CYLINDER = mujoco.mjtGeom.mjGEOM_CYLINDER
+_FIXTURE = {"contype": FIXTURE_CONTACT[0], "conaffinity": FIXTURE_CONTACT[1]}
+_LOOK = {"contype": 0, "conaffinity": 0, "mass": 0, "group": 1}
+
+
+def build_scene(arm: ArmConfig, scenario: Scenario, *, physics_s: float) -> mujoco.MjSpec:
+    """Return the whole world: arm, gripper, table, buttons, boxes, lids, cylinders, actuators and sensors."""
+    spec = arm_spec(arm)
+    spec.modelname = f"{arm.name}_{scenario.name}"
+    _set_options(spec, physics_s)
+    _add_surroundings(spec, scenario)
+    for button in scenario.buttons:
+        _add_button(spec, button, scenario.table.height_m)
+    for box in scenario.boxes:
+        _add_box(spec, box, scenario.table.height_m)
+    for cylinder in scenario.cylinders:
+        _add_cylinder(spec, cylinder)
+    _add_servos(spec, arm, physics_s)
+    _add_grip(spec, arm)
+    spec.add_sensor(
+        name="tool_force", type=mujoco.mjtSensor.mjSENS_CONTACT, objtype=mujoco.mjtObj.mjOBJ_XBODY, objname="tool",
+        intprm=[1 << int(mujoco.mjtConDataField.mjCONDATA_FORCE), 3, 1],
+    )  # fmt: skip
+    return spec
+
+
+def leaf_names(box: Box) -> tuple[str, str]:
+    """Return the joint names of a box's two lid leaves."""
+    return f"{box.name}_leaf_near", f"{box.name}_leaf_far"
+
+
+def _set_options(spec: mujoco.MjSpec, physics_s: float) -> None:
+    option = spec.option
+    option.timestep = physics_s
+    option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
+    option.impratio = 10.0
+    option.jacobian = mujoco.mjtJacobian.mjJAC_DENSE
+    option.tolerance = 1e-7
+    option.iterations = 30
+
+
+def _add_surroundings(spec: mujoco.MjSpec, scenario: Scenario) -> None:
+    table = scenario.table
+    world = spec.worldbody
+    spec.visual.global_.offwidth, spec.visual.global_.offheight = 1280, 960
+    spec.visual.quality.shadowsize = 4096
+    spec.visual.headlight.ambient = [0.38, 0.38, 0.40]
+    spec.visual.headlight.diffuse = [0.32, 0.32, 0.32]
+    spec.visual.headlight.specular = [0.1, 0.1, 0.1]
+    spec.visual.map.znear = 0.02
+    world.add_light(pos=[0.2, -0.9, 1.7], dir=[0.1, 0.6, -1.0], diffuse=[0.55, 0.54, 0.52], castshadow=True)
+    world.add_light(pos=[1.3, 0.9, 1.6], dir=[-0.6, -0.5, -1.0], diffuse=[0.22, 0.23, 0.25], castshadow=False)
+    x, y = table.centre_m
+    world.add_geom(
+        name="table", type=mujoco.mjtGeom.mjGEOM_PLANE, pos=[x, y, table.height_m], size=[2, 2, 0.1], group=3,
+        rgba=[0, 0, 0, 0], condim=4, friction=[0.8, 0.01, 0.0001], **_FIXTURE,
+    )  # fmt: skip
+    half = [table.size_m[0] / 2, table.size_m[1] / 2, 0.02]
+    world.add_geom(type=_BOX, pos=[x, y, table.height_m - 0.0205], size=half, rgba=[*table.colour, 1], **_LOOK)
+    world.add_geom(
+        type=_BOX, pos=[-0.02, 0, table.height_m - 0.03], size=[0.16, 0.2, 0.03], rgba=[0.32, 0.33, 0.35, 1], **_LOOK
+    )
+    spec.add_texture(
+        name="sky", type=mujoco.mjtTexture.mjTEXTURE_SKYBOX, builtin=mujoco.mjtBuiltin.mjBUILTIN_GRADIENT,
+        rgb1=[0.86, 0.89, 0.92], rgb2=[0.62, 0.66, 0.70], width=64, height=384,
+    )  # fmt: skip
+    world.add_geom(
+        type=mujoco.mjtGeom.mjGEOM_PLANE, pos=[0, 0, table.height_m - 0.75], size=[4, 4, 0.1],
+        rgba=[0.60, 0.61, 0.62, 1], **_LOOK,
+    )  # fmt: skip
+    world.add_camera(name="overview", pos=[1.45, -1.0, 0.95], xyaxes=[0.62, 0.785, 0, -0.42, 0.33, 0.845], fovy=40)
+
+
+def _add_button(spec: mujoco.MjSpec, button: Button, table_m: float) -> None:
+    """A cap on a preloaded spring inside a dark ring; the cap wears a dome."""
+    radius = button.diameter_m / 2
+    cap_half = 0.006
+    base = spec.worldbody.add_body(name=button.name, pos=[*button.position_m, table_m])
+    ring = button.height_m - button.travel_m - 2 * cap_half
+    base.add_geom(
+        type=_CYLINDER, size=[radius + 0.006, ring / 2, 0], pos=[0, 0, ring / 2], rgba=[0.16, 0.17, 0.18, 1],
+        friction=[0.6, 0.01, 0.0001], **_FIXTURE,
+    )  # fmt: skip
+    cap = base.add_body(name=f"{button.name}_cap", pos=[0, 0, button.height_m - cap_half])
+    cap.add_joint(
+        name=f"{button.name}_travel", type=mujoco.mjtJoint.mjJNT_SLIDE, axis=[0, 0, -1], range=[0, button.travel_m],
+        limited=mujoco.mjtLimited.mjLIMITED_TRUE, stiffness=800.0, springref=-0.004, damping=4.0,
+        solref_limit=[0.008, 1.0],
+    )  # fmt: skip
+    cap.add_geom(
+        name=f"{button.name}_cap", type=_CYLINDER, size=[radius, cap_half, 0], mass=0.05,
+        friction=[0.6, 0.01, 0.0001], rgba=[*button.colour, 1], **_FIXTURE,
+    )  # fmt: skip
+    cap.add_geom(
+        name=f"{button.name}_dome", type=mujoco.mjtGeom.mjGEOM_ELLIPSOID, size=[radius * 0.97, radius * 0.97, 0.009],
+        pos=[0, 0, cap_half - 0.003], rgba=[*button.colour, 1], **_LOOK,
+    )  # fmt: skip
+
+
+def _add_box(spec: mujoco.MjSpec, box: Box, table_m: float) -> None:
+    """Four walls on the table, and two lid leaves hinged at the walls that face the robot and look away from it."""
+    (lx, ly), w, h = box.inner_m, box.wall_m, box.height_m
+    body = spec.worldbody.add_body(name=box.name, pos=[*box.position_m, table_m])
+    body.add_geom(type=_BOX, size=[lx / 2, ly / 2, 0.0006], pos=[0, 0, 0.0004], rgba=[*_dim(box.colour), 1], **_LOOK)
+    for axis, sign in ((0, 1), (0, -1), (1, 1), (1, -1)):
+        size = [w / 2, ly / 2 + w, h / 2] if axis == 0 else [lx / 2, w / 2, h / 2]
+        pos = [0.0, 0.0, h / 2]
+        pos[axis] = sign * ((lx if axis == 0 else ly) / 2 + w / 2)
+        body.add_geom(type=_BOX, size=size, pos=pos, rgba=[*box.colour, 1], friction=[0.6, 0.01, 0.0001], **_FIXTURE)
+    if box.lid is None:
+        return
+    leaf = lx / 2 + w / 2
+    for name, sign in zip(leaf_names(box), (-1, 1), strict=True):
+        hinge = body.add_body(name=name, pos=[sign * leaf, 0, h + LEAF_THICKNESS_M / 2])
+        hinge.add_joint(
+            name=name, type=mujoco.mjtJoint.mjJNT_HINGE, axis=[0, sign, 0], range=[0, box.lid.open_angle_rad + 0.05],
+            limited=mujoco.mjtLimited.mjLIMITED_TRUE, damping=0.02, armature=0.0005,
+        )  # fmt: skip
+        hinge.add_geom(
+            name=name, type=_BOX, size=[(leaf - 0.001) / 2, ly / 2 + w, LEAF_THICKNESS_M / 2],
+            pos=[-sign * (leaf - 0.001) / 2, 0, 0], mass=0.06, rgba=[*_dim(box.colour, 0.86), 1],
+            friction=[0.6, 0.01, 0.0001], solref=[0.015, 1.0], **_FIXTURE,
+        )  # fmt: skip
+        torque = box.lid.force_n * leaf
+        drive = spec.add_actuator(
+            name=name, trntype=mujoco.mjtTrn.mjTRN_JOINT, target=name, forcerange=[-torque, torque],
+            forcelimited=mujoco.mjtLimited.mjLIMITED_TRUE,
+        )  # fmt: skip
+        drive.set_to_position(kp=2.0, kv=0.08)
+        spec.add_equality(
+            name=f"{name}_lock", type=mujoco.mjtEq.mjEQ_JOINT, name1=name, objtype=mujoco.mjtObj.mjOBJ_JOINT,
+            data=[0.0] * 12, active=False, solref=[0.01, 1.0],
+        )  # fmt: skip
+
+
+def _add_cylinder(spec: mujoco.MjSpec, cylinder: Cylinder) -> None:
+    body = spec.worldbody.add_body(name=cylinder.name, pos=[*cylinder.position_m, cylinder.height_m / 2])
+    body.add_freejoint(name=cylinder.name)
+    contype, conaffinity = OBJECT_CONTACT
+    body.add_geom(
+        name=cylinder.name, type=_CYLINDER, size=[cylinder.diameter_m / 2, cylinder.height_m / 2, 0],
+        mass=cylinder.mass_kg, friction=[cylinder.friction, 0.005, 0.0001], condim=4, rgba=[*cylinder.colour, 1],
+        solref=GRIP_SOLREF, solimp=GRIP_SOLIMP, contype=contype, conaffinity=conaffinity,
+    )  # fmt: skip
+
+
+def _add_servos(spec: mujoco.MjSpec, arm: ArmConfig, physics_s: float) -> None:
+    """Position servos whose ramp lag kd / kp plus dead time follows robot.servo.lag_s; torque limits from the file."""
+    servo = arm.servo
+    lag = lag_s(lookahead_s=servo.lookahead_s, gain=servo.gain, dead_time_s=servo.dead_time_s) - servo.dead_time_s
+    n_delay = round(servo.dead_time_s / physics_s)
+    for joint, kp in zip(arm.joints, SERVO_STIFFNESS, strict=True):
+        actuator = spec.add_actuator(
+            name=joint.name, trntype=mujoco.mjtTrn.mjTRN_JOINT, target=joint.name,
+            forcerange=[-joint.torque_nm, joint.torque_nm], forcelimited=mujoco.mjtLimited.mjLIMITED_TRUE,
+        )  # fmt: skip
+        actuator.set_to_position(kp=kp, kv=kp * lag)
+        if n_delay:
+            actuator.nsample = n_delay
+            actuator.delay = n_delay * physics_s
+
+
+def _add_grip(spec: mujoco.MjSpec, arm: ArmConfig) -> None:
+    """One actuator on the opening; the linkage that keeps a real gripper's fingers symmetric is a joint equality."""
+    tendon = spec.add_tendon(name="opening")
+    tendon.wrap_joint("finger_left", 1.0)
+    tendon.wrap_joint("finger_right", 1.0)
+    force = arm.tool.grip_force_n
+    actuator = spec.add_actuator(
+        name="grip", trntype=mujoco.mjtTrn.mjTRN_TENDON, target="opening", forcerange=[-force, force],
+        forcelimited=mujoco.mjtLimited.mjLIMITED_TRUE,
+    )  # fmt: skip
+    actuator.set_to_position(kp=FINGER_STIFFNESS, kv=60.0)
+    spec.add_equality(
+        name="linkage", type=mujoco.mjtEq.mjEQ_JOINT, name1="finger_left", name2="finger_right",
+        objtype=mujoco.mjtObj.mjOBJ_JOINT, data=[0.0, 1.0, *([0.0] * 10)], active=True, solref=[0.004, 1.0],
+        solimp=[0.98, 0.999, 0.001, 0.5, 2],
+    )  # fmt: skip
+
+
+def _dim(colour: tuple[float, float, float], by: float = 0.6) -> tuple[float, float, float]:
+    r, g, b = colour
+    return (r * by, g * by, b * by)

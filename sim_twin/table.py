@@ -1,0 +1,116 @@
+"""The table's driven and sensed parts: button switches, box sensors, lid drives and locks."""
+
+import mujoco
+
+from config.scenario import Box, Button, Cylinder, Scenario
+from sim_twin.scene import leaf_names
+
+__all__ = ["TableDrive"]
+
+CLOSES_AT, OPENS_AT = 0.6, 0.4  # shares of a button's travel
+SHUT_RAD = 0.01
+
+
+class _Switch:
+    """A button's contact with hysteresis on its travel."""
+
+    def __init__(self, model: mujoco.MjModel, button: Button) -> None:
+        self._address = int(model.joint(f"{button.name}_travel").qposadr[0])
+        self._closes_m, self._opens_m = CLOSES_AT * button.travel_m, OPENS_AT * button.travel_m
+        self._bit = 1 << button.input
+        self.is_closed = False
+
+    def read(self, data: mujoco.MjData) -> int:
+        """Return the input's bit."""
+        travel = data.qpos[self._address]
+        self.is_closed = travel >= (self._opens_m if self.is_closed else self._closes_m)
+        return self._bit if self.is_closed else 0
+
+
+class _Lid:
+    """Two leaves that move at a set speed towards open or shut, and lock when shut and not asked open."""
+
+    def __init__(self, model: mujoco.MjModel, box: Box, tick_s: float) -> None:
+        assert box.lid is not None
+        names = leaf_names(box)
+        self.angle_addresses = [int(model.joint(n).qposadr[0]) for n in names]
+        self._controls = [model.actuator(n).id for n in names]
+        self._locks = [model.equality(f"{n}_lock").id for n in names]
+        self._bit = 1 << box.lid.output
+        self._open_rad = box.lid.open_angle_rad
+        self._step_rad = box.lid.speed_rad_s * tick_s
+        self._asked_rad = 0.0
+
+    def put(self, data: mujoco.MjData, digital_out: int) -> None:
+        """Place the leaves where the output says (a reset)."""
+        self._asked_rad = self._open_rad if digital_out & self._bit else 0.0
+        for address in self.angle_addresses:
+            data.qpos[address] = self._asked_rad
+        self._apply(data, is_open=bool(digital_out & self._bit))
+
+    def drive(self, data: mujoco.MjData, digital_out: int) -> None:
+        """Move the set-point by one tick and lock or free the leaves."""
+        is_open = bool(digital_out & self._bit)
+        goal = self._open_rad if is_open else 0.0
+        if goal != self._asked_rad or not is_open:
+            step = min(max(goal - self._asked_rad, -self._step_rad), self._step_rad)
+            self._asked_rad += step
+            self._apply(data, is_open=is_open)
+
+    def _apply(self, data: mujoco.MjData, *, is_open: bool) -> None:
+        for control, lock, address in zip(self._controls, self._locks, self.angle_addresses, strict=True):
+            data.ctrl[control] = self._asked_rad
+            data.eq_active[lock] = not is_open and data.qpos[address] < SHUT_RAD
+
+
+class _Presence:
+    """A sensor in a box's floor that sees a cylinder standing or lying over it."""
+
+    def __init__(self, model: mujoco.MjModel, box: Box, cylinders: tuple[Cylinder, ...]) -> None:
+        assert box.presence_input is not None
+        self._bit = 1 << box.presence_input
+        self._box = model.body(box.name).id
+        self._half = (box.inner_m[0] / 2, box.inner_m[1] / 2, box.height_m)
+        self._bodies = [model.body(c.name).id for c in cylinders]
+
+    def read(self, data: mujoco.MjData) -> int:
+        """Return the input's bit."""
+        bx, by, bz = data.xpos[self._box]
+        hx, hy, h = self._half
+        for body in self._bodies:
+            x, y, z = data.xpos[body]
+            if abs(x - bx) < hx and abs(y - by) < hy and z - bz < h:
+                return self._bit
+        return 0
+
+
+class TableDrive:
+    """All of a scenario's wiring to the physics: inputs out of it, outputs into it."""
+
+    def __init__(self, model: mujoco.MjModel, scenario: Scenario, *, tick_s: float) -> None:
+        self._switches = [_Switch(model, b) for b in scenario.buttons]
+        self._lids = [_Lid(model, b, tick_s) for b in scenario.boxes if b.lid is not None]
+        self._presences = [
+            _Presence(model, b, scenario.cylinders) for b in scenario.boxes if b.presence_input is not None
+        ]
+
+    def put(self, data: mujoco.MjData, digital_out: int) -> None:
+        """Place lids where the outputs say and forget the switches (a reset)."""
+        for switch in self._switches:
+            switch.is_closed = False
+        for lid in self._lids:
+            lid.put(data, digital_out)
+
+    def drive(self, data: mujoco.MjData, digital_out: int) -> None:
+        """Advance the lid drives by one tick."""
+        for lid in self._lids:
+            lid.drive(data, digital_out)
+
+    def read_inputs(self, data: mujoco.MjData) -> int:
+        """Return the digital inputs as bits."""
+        bits = 0
+        for switch in self._switches:
+            bits |= switch.read(data)
+        for presence in self._presences:
+            bits |= presence.read(data)
+        return bits
