@@ -1,0 +1,163 @@
+"""Where the tool is for given joints, and which joints bring it somewhere: placo on the arm's own model.
+
+The forward path that runs every tick is plain floats on the Denavit-Hartenberg rows (about 1 us); the inverse is placo
+on the MJCF that the twin is built from. A test holds all of them together to 1e-6 m.
+"""
+
+import contextlib
+import math
+import os
+import sys
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import placo
+
+from config.arm import ArmConfig
+from robot.description import tool_down, write_mjcf
+from robot.errors import RobotError
+from robot.messages import Vec3, Vec6
+
+__all__ = ["Kinematics", "ToolChain", "UnreachableError"]
+
+N_JOINTS = 6
+TOLERANCE = 1e-5
+"""A solution is off by no more than this in any entry of T_bt (metres, and sines of angles)."""
+MAX_ITERATIONS = 40
+
+
+class UnreachableError(RobotError, ValueError):
+    """No joint angles within range bring the tool there."""
+
+
+class ToolChain:
+    """Forward kinematics of the tool's axis in plain floats, for the loops that run every tick."""
+
+    def __init__(self, arm: ArmConfig) -> None:
+        rows = [(j.a_m, j.d_m, math.cos(j.alpha_rad), math.sin(j.alpha_rad)) for j in arm.joints]
+        self._rows = tuple(reversed(rows))
+        self._tcp = arm.tool.tcp_m
+        x, y, z = arm.tool.tcp_m
+        self._tip = (x, y, z + arm.tool.tip_below_tcp_m)
+
+    def tcp(self, q_rad: Vec6) -> Vec3:
+        """Return the tool centre point for joint angles, base frame, metres."""
+        return self._point(q_rad, self._tcp)
+
+    def tip(self, q_rad: Vec6) -> Vec3:
+        """Return the point between the fingertips for joint angles, base frame, metres."""
+        return self._point(q_rad, self._tip)
+
+    def _point(self, q_rad: Vec6, point_m: Vec3) -> Vec3:
+        """Carry a point of the flange frame down the chain: p_i-1 = Rz(q) Tz(d) Tx(a) Rx(alpha) p_i."""
+        x, y, z = point_m
+        i = N_JOINTS
+        for a, d, ca, sa in self._rows:
+            i -= 1
+            s, c = math.sin(q_rad[i]), math.cos(q_rad[i])
+            u, v = x + a, ca * y - sa * z
+            x, y, z = c * u - s * v, s * u + c * v, sa * y + ca * z + d
+        return x, y, z
+
+
+class Kinematics:
+    """Inverse kinematics of one arm. Every call starts afresh: the same question has the same answer, bit for bit.
+
+    Args:
+        arm: The arm's file.
+    """
+
+    def __init__(self, arm: ArmConfig) -> None:
+        self.chain = ToolChain(arm)
+        self._yaw_rad = arm.tool_yaw_rad
+        self._ranges = tuple(j.range_rad for j in arm.joints)
+        self._robot = _load(arm)
+        self._offset = self._robot.get_joint_offset(arm.joints[0].name)
+        self._rest_q = np.zeros(len(self._robot.state.q))
+        self._solver = placo.KinematicsSolver(self._robot)
+        if self._offset:
+            # placo gives a model without joint at its root a floating base, at a random pose until it is told.
+            self._rest_q[self._offset - 1] = 1.0
+            self._solver.mask_fbase(True)
+        for name in self._robot.joint_names():
+            if name not in {j.name for j in arm.joints}:
+                self._solver.mask_dof(name)
+        self._T_bt = np.eye(4)
+        self._T_bt[:3, :3] = tool_down(self._yaw_rad)
+        self._yaw_now_rad = self._yaw_rad
+        self._task = self._solver.add_frame_task("tcp", self._T_bt)
+        self._task.configure("tcp", "soft", 1.0, 1.0)
+
+    def tcp(self, q_rad: Vec6) -> Vec3:
+        """Return the tool centre point for joint angles, base frame, metres."""
+        return self.chain.tcp(q_rad)
+
+    def solve(self, position_m: Vec3, seed_rad: Vec6, *, yaw_rad: float | None = None) -> Vec6:
+        """Return the joint angles nearest a seed that bring the tool, pointing down, to a position.
+
+        Args:
+            position_m: Tool centre point, base frame.
+            seed_rad: Where to start from; a neighbour of the answer.
+            yaw_rad: Turn of the tool about the vertical; the arm's own where absent.
+
+        Raises:
+            UnreachableError: nothing within range comes closer than the tolerance.
+        """
+        self._set_yaw(self._yaw_rad if yaw_rad is None else yaw_rad)
+        T_bt, robot, lo = self._T_bt, self._robot, self._offset
+        T_bt[0, 3], T_bt[1, 3], T_bt[2, 3] = position_m
+        q = self._rest_q.copy()
+        q[lo : lo + N_JOINTS] = seed_rad
+        robot.state.q = q
+        robot.update_kinematics()
+        self._task.T_world_frame = T_bt
+        residual = self._iterate()
+        x = robot.state.q[lo : lo + N_JOINTS].tolist()
+        if residual > TOLERANCE or not all(low <= v <= high for v, (low, high) in zip(x, self._ranges, strict=True)):
+            raise UnreachableError(f"no joint angles within range reach {position_m} m (residual {residual:.2g})")
+        return x[0], x[1], x[2], x[3], x[4], x[5]
+
+    def _iterate(self) -> float:
+        """Run the solver to tolerance and return what is left of the error."""
+        robot, solver, T_bt = self._robot, self._solver, self._T_bt
+        residual = math.inf
+        for _ in range(MAX_ITERATIONS):
+            try:
+                solver.solve(True)
+            except RuntimeError:  # placo's QPError: a seed outside the joint ranges has no feasible step
+                return math.inf
+            robot.update_kinematics()
+            residual = float(np.abs(robot.get_T_world_frame("tcp") - T_bt).max())
+            if residual < TOLERANCE or not math.isfinite(residual):
+                break
+        return residual
+
+    def _set_yaw(self, yaw_rad: float) -> None:
+        if yaw_rad != self._yaw_now_rad:
+            self._T_bt[:3, :3] = tool_down(yaw_rad)
+            self._yaw_now_rad = yaw_rad
+
+
+def _load(arm: ArmConfig) -> placo.RobotWrapper:
+    """Load the arm's MJCF; placo reads files only."""
+    with tempfile.TemporaryDirectory(prefix="autotelic_") as folder:
+        path = Path(folder) / "arm.xml"
+        write_mjcf(arm, path)
+        with _silenced():
+            return placo.RobotWrapper(str(path), placo.Flags.mjcf | placo.Flags.ignore_collisions)
+
+
+@contextlib.contextmanager
+def _silenced() -> Iterator[None]:
+    """Send the process's standard output nowhere: placo prints from C++ on load."""
+    sys.stdout.flush()
+    saved = os.dup(1)
+    try:
+        with open(os.devnull, "wb") as nowhere:
+            os.dup2(nowhere.fileno(), 1)
+        yield
+    finally:
+        os.dup2(saved, 1)
+        os.close(saved)
