@@ -39,6 +39,8 @@ class GoalSelection(Section, frozen=True, kw_only=True):
     """Least total probability spread evenly over all goals, so that mastered goals are still looked at."""
     rearm: bool = False
     """Raise a goal's value again when what it was believed to need has changed or it begins to fail."""
+    rearm_value: Positive = 0.2
+    """Value that a goal armed again has at least."""
 
 
 class SubgoalSelection(Section, frozen=True, kw_only=True):
@@ -62,6 +64,8 @@ class SubgoalSelection(Section, frozen=True, kw_only=True):
     """Chance per attempt that the preconditions were drawn anew: the change detector."""
     false_positive: Share = 0.02
     """Chance that a goal is achieved although its preconditions do not hold."""
+    blocked_error: Share = 0.05
+    """Least chance that a trial counts as blocked although nothing was missing."""
     use_blocked_only: bool = True
     """Only trials that reached the place but were blocked are evidence against."""
 
@@ -117,6 +121,12 @@ class Experiment(Section, frozen=True, kw_only=True):
     dense_for: Annotated[int, Meta(ge=0)] = 0
     """Evaluate every dense_every epochs for this many epochs after the start and after each change of rules."""
     checkpoint_every: Count = 50
+    blocked_after: Annotated[int, Meta(ge=1, le=1000)] = 3
+    """So many time steps running at the sub-goal's place to no effect make a trial a blocked one."""
+    end_blocked: bool = True
+    """End a trial as soon as it counts as blocked: there is nothing more to learn from it."""
+    void_limit: Count = 10
+    """So many void epochs running fail the run."""
 
 
 class LearningConfig(Section, frozen=True, kw_only=True):

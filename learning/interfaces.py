@@ -39,6 +39,10 @@ class Attempt(msgspec.Struct, frozen=True, kw_only=True):
     """Goals latched before the trial."""
     state_after: GoalState
     """Goals latched after the trial; may hold goals reached by accident."""
+    holds: GoalState | None = None
+    """Goals that hold at the trial's start, not latched: a thing dropped is held no longer. None where not judged."""
+    holds_after: GoalState | None = None
+    """Goals that hold at the trial's end, not latched."""
     outcome: TrialOutcome
     predicted: float
     """Expected probability of achieving the sub-goal, said at the trial's start, in [0, 1]."""
@@ -64,6 +68,10 @@ class SubgoalSelector(Protocol):
 
     def update(self, attempt: Attempt) -> None:
         """Learn from one trial. Void attempts change nothing."""
+        ...
+
+    def changed_goals(self) -> tuple[int, ...]:
+        """Return the goals for which what they are believed to need was revised by the last update."""
         ...
 
     def state_dict(self) -> dict[str, Any]:

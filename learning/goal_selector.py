@@ -1,0 +1,127 @@
+"""The goal selector: an N-armed bandit that chooses the goal of each epoch by competence improvement.
+
+Values are exponential moving averages of ΔC^g; the goal is drawn by softmax over them. A bandit on improvement starves
+what is mastered, so that a later break is noticed only by luck: a floor under the probabilities keeps looking, and a
+goal whose believed needs changed, or that begins to fail, is armed again.
+"""
+
+from collections import deque
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+
+from config.learning import GoalSelection, SubgoalSelection
+from learning.choice import draw, softmax
+from learning.competence import (
+    absolute_improvement,
+    clipped_success_improvement,
+    delta_competence,
+    has_dropped,
+    running_success,
+    subgoal_temperature,
+)
+from learning.interfaces import Attempt, TrialOutcome
+
+__all__ = ["GoalSelector"]
+
+
+class GoalSelector:
+    """Chooses goals, keeps each goal's record of attempts, and sets the sub-goal selector's temperature by it.
+
+    An attempt is credited to the sub-goal tried in a trial, or, with credit `main_goal`, a whole epoch counts as one
+    attempt at its goal.
+    """
+
+    def __init__(
+        self, *, n_goals: int, config: GoalSelection, subgoals: SubgoalSelection, rng: np.random.Generator
+    ) -> None:
+        self._config = config
+        self._subgoals = subgoals
+        self._rng = rng
+        self._values = np.zeros(n_goals)
+        n_kept = max(2 * config.window, subgoals.competence_window)
+        self._cp = [deque[float](maxlen=n_kept) for _ in range(n_goals)]
+        self._results = [deque[float](maxlen=n_kept) for _ in range(n_goals)]
+
+    # ----------------------------------------------------------------------------------------------------- decide
+
+    def select(self) -> int:
+        """Return the goal of the next epoch."""
+        return draw(self.probabilities(), self._rng)
+
+    def probabilities(self) -> np.ndarray:
+        """Return each goal's chance of being chosen next.  () -> (n,)"""
+        floor = self._config.probability_floor
+        return (1.0 - floor) * softmax(self._values, self._config.temperature) + floor / len(self._values)
+
+    def temperature(self, goal: int) -> float:
+        """Return the temperature of the sub-goal choice while pursuing a goal."""
+        return subgoal_temperature(self._subgoals, improvement=self.improvement(goal), success=self.success(goal))
+
+    # ------------------------------------------------------------------------------------------------------ learn
+
+    def update(self, attempt: Attempt) -> None:
+        """Learn from one trial. A void one is evidence about nothing."""
+        if self._config.credit == "subgoal" and attempt.outcome is not TrialOutcome.VOID:
+            is_achieved = attempt.outcome is TrialOutcome.ACHIEVED
+            self._credit(attempt.subgoal, predicted=attempt.predicted, is_achieved=is_achieved)
+
+    def end_epoch(self, goal: int, *, predicted: float, is_achieved: bool) -> None:
+        """Learn from one epoch that was not void; predicted is the chance of its goal said at the epoch's start."""
+        if self._config.credit == "main_goal":
+            self._credit(goal, predicted=predicted, is_achieved=is_achieved)
+
+    def rearm(self, goals: Iterable[int]) -> None:
+        """Raise the values of goals whose believed needs have changed, where the config asks for it."""
+        if self._config.rearm:
+            for goal in goals:
+                self._values[goal] = max(float(self._values.max()), self._config.rearm_value)
+
+    def _credit(self, goal: int, *, predicted: float, is_achieved: bool) -> None:
+        expected = predicted if self._config.prediction == "expert_utility" else self.success(goal)
+        result = float(is_achieved)
+        self._cp[goal].append(expected - result)
+        self._results[goal].append(result)
+        self._values[goal] += self._config.ema_rate * (self.improvement(goal) - self._values[goal])
+        if has_dropped(list(self._results[goal]), self._config.window):
+            self.rearm((goal,))
+
+    # ------------------------------------------------------------------------------------------------------- tell
+
+    def improvement(self, goal: int) -> float:
+        """Return ΔC^g in the reading that the config asks for."""
+        window = self._config.window
+        match self._config.improvement:
+            case "printed":
+                return delta_competence(list(self._cp[goal]), window)
+            case "clipped_success":
+                return clipped_success_improvement(list(self._results[goal]), window)
+            case "absolute":
+                return absolute_improvement(list(self._results[goal]), window)
+
+    def success(self, goal: int) -> float:
+        """Return the running success of a goal."""
+        return running_success(list(self._results[goal]), self._subgoals.competence_window)
+
+    @property
+    def values(self) -> tuple[float, ...]:
+        """Each goal's value."""
+        return tuple(self._values.tolist())
+
+    def state_dict(self) -> dict[str, Any]:
+        """Return everything learnt and the generator's state."""
+        return {
+            "values": self._values.copy(),
+            "cp": [list(kept) for kept in self._cp],
+            "results": [list(kept) for kept in self._results],
+            "rng": self._rng.bit_generator.state,
+        }
+
+    def load_state_dict(self, state: dict[str, Any]) -> None:
+        """Restore bit for bit."""
+        self._values = np.array(state["values"], dtype=float)
+        for kept, loaded in zip((*self._cp, *self._results), (*state["cp"], *state["results"]), strict=True):
+            kept.clear()
+            kept.extend(loaded)
+        self._rng.bit_generator.state = state["rng"]
