@@ -5,7 +5,7 @@ from typing import Literal as OneOf
 
 from msgspec import Meta
 
-from config.values import Name, NonNegative, Positive, Section, Share
+from config.values import Name, NonNegative, Positive, Section, Share, Span
 
 __all__ = [
     "Actions",
@@ -82,6 +82,14 @@ class Expert(Section, frozen=True, kw_only=True):
     buffer_steps: Count = 20_000
     established_after: Count = 10
     """Successes after which the expert alone moves the arm."""
+    horizon: Count = 70
+    """Steps over which utility falls from 1 to 0 along a success trace."""
+    failure_share: Share = 0.3
+    """Share of failures in a batch."""
+    refresh_every: Count = 10
+    """A settled expert is trained only every so many trials, or when it fails."""
+    scales_m: Annotated[tuple[Span, ...], Meta(max_length=4)] = (0.1, 0.03)
+    """Ranges of the exponentials that a distance is normalised by."""
 
 
 class Novelty(Section, frozen=True, kw_only=True):
@@ -89,6 +97,12 @@ class Novelty(Section, frozen=True, kw_only=True):
 
     memory: Count = 200
     temperature: Positive = 0.05
+    wishes: Count = 128
+    """Places compared when a new wish is made."""
+    reach_m: Span = 0.5
+    """How far off a wish may be."""
+    still_m: Span = 0.002
+    """P counts as still when no distance changes more than this in a time step."""
 
 
 class ForwardModel(Section, frozen=True, kw_only=True):

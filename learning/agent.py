@@ -1,0 +1,247 @@
+"""The agent: three layers at three time scales. An epoch has a goal, a trial a sub-goal, a time step an intent.
+
+Read it as the paper tells it: the goal selector chooses at each epoch, the sub-goal selector at each trial, the
+sub-goal's expert at each time step. What was achieved in an epoch stays achieved (latched) until the next reset.
+"""
+
+from typing import Any, Protocol
+
+import msgspec
+
+from config.learning import Experiment
+from learning.interfaces import Attempt, Experts, GoalState, SubgoalSelector, TrialOutcome
+from learning.stopwatch import Stopwatch
+from robot.messages import Percept
+from robot.station import Station
+
+__all__ = ["Agent", "EpochRecord", "GoalJudge", "GoalSelector", "TrialRecord"]
+
+
+class GoalSelector(Protocol):
+    """The bandit over goals, and the competence that sets the sub-goal selector's temperature."""
+
+    def select(self) -> int:
+        """Return the goal of the next epoch."""
+        ...
+
+    def temperature(self, goal: int) -> float:
+        """Return the temperature of the sub-goal choice while pursuing a goal."""
+        ...
+
+    def update(self, attempt: Attempt) -> None:
+        """Learn from one trial."""
+        ...
+
+    def end_epoch(self, goal: int, *, predicted: float, is_achieved: bool) -> None:
+        """Learn from one epoch; predicted is the chance of its goal said at the epoch's start."""
+        ...
+
+    def state_dict(self) -> dict[str, Any]:
+        """Return everything learnt and the generator's state."""
+        ...
+
+    def load_state_dict(self, state: dict[str, Any]) -> None:
+        """Restore bit for bit."""
+        ...
+
+
+class GoalJudge(Protocol):
+    """Judges goals on the percept. Keeps no memory."""
+
+    @property
+    def n_goals(self) -> int:
+        """How many goals there are."""
+        ...
+
+    def achieved(self, percept: Percept) -> GoalState:
+        """Return which goals hold now."""
+        ...
+
+    def is_at_place(self, goal: int, percept: Percept) -> bool:
+        """Whether the tool is where the goal should come about, hand free (or full) as it must be."""
+        ...
+
+
+class TrialRecord(msgspec.Struct, frozen=True, kw_only=True):
+    """One trial."""
+
+    trial: int
+    """Counted from 1 within the epoch."""
+    attempt: Attempt
+    temperature: float
+    """Temperature of the sub-goal choice."""
+
+
+class EpochRecord(msgspec.Struct, frozen=True, kw_only=True):
+    """One epoch."""
+
+    epoch: int
+    goal: int
+    is_achieved: bool
+    is_void: bool
+    """Cut short: evidence about nothing."""
+    trials: tuple[TrialRecord, ...]
+
+    @property
+    def n_steps(self) -> int:
+        """Time steps of all trials."""
+        return sum(record.attempt.n_steps for record in self.trials)
+
+
+class _Scene:
+    """What holds in the epoch in hand."""
+
+    def __init__(self, percept: Percept, holding: GoalState) -> None:
+        self.percept = percept
+        self.holding = holding
+        """Goals that hold now."""
+        self.latched = holding
+        """Goals that held at some time in this epoch."""
+
+    def available(self) -> tuple[bool, ...]:
+        """Which goals may be pursued: not achieved yet, or true no longer (a dropped object may be taken again)."""
+        return tuple(not held for held in self.holding)
+
+
+class Agent:
+    """Composes goal selector, sub-goal selector, experts and goal judge."""
+
+    def __init__(
+        self,
+        *,
+        goal_selector: GoalSelector,
+        subgoal_selector: SubgoalSelector,
+        experts: Experts,
+        judge: GoalJudge,
+        protocol: Experiment,
+        stopwatch: Stopwatch | None = None,
+    ) -> None:
+        self.goal_selector = goal_selector
+        self.subgoal_selector = subgoal_selector
+        self.experts = experts
+        self.judge = judge
+        self._protocol = protocol
+        self._stopwatch = stopwatch or Stopwatch()
+        self._nothing: GoalState = (False,) * judge.n_goals
+
+    @property
+    def n_goals(self) -> int:
+        """How many goals there are."""
+        return self.judge.n_goals
+
+    def learn_epoch(self, station: Station, *, epoch: int, seed: int) -> EpochRecord:
+        """Choose a goal, lay the table out and pursue it for up to eight trials, learning."""
+        goal = self.goal_selector.select()
+        self._stopwatch.lap("selectors")
+        scene = self._reset(station, epoch=epoch, seed=seed)
+        predicted = self.experts.utility(goal, scene.percept)
+        record = self._run_epoch(station, scene, epoch=epoch, goal=goal, explore=True)
+        if not record.is_void:
+            self.goal_selector.end_epoch(goal, predicted=predicted, is_achieved=record.is_achieved)
+        self._stopwatch.lap("selectors")
+        return record
+
+    def test_epoch(self, station: Station, *, epoch: int, seed: int, goal: int) -> EpochRecord:
+        """Pursue a given goal with learning off: nothing is drawn, nothing learnt changes."""
+        scene = self._reset(station, epoch=epoch, seed=seed)
+        return self._run_epoch(station, scene, epoch=epoch, goal=goal, explore=False)
+
+    def state_dict(self) -> dict[str, Any]:
+        """Return everything learnt and the generators' states."""
+        return {
+            "goal_selector": self.goal_selector.state_dict(),
+            "subgoal_selector": self.subgoal_selector.state_dict(),
+            "experts": self.experts.state_dict(),
+        }
+
+    def load_state_dict(self, state: dict[str, Any]) -> None:
+        """Restore bit for bit."""
+        self.goal_selector.load_state_dict(state["goal_selector"])
+        self.subgoal_selector.load_state_dict(state["subgoal_selector"])
+        self.experts.load_state_dict(state["experts"])
+
+    # ------------------------------------------------------------------------------------------------------- epoch
+
+    def _reset(self, station: Station, *, epoch: int, seed: int) -> _Scene:
+        percept = station.reset(seed=seed, epoch=epoch)
+        self._stopwatch.lap("reset")
+        return _Scene(percept, self.judge.achieved(percept))
+
+    def _run_epoch(self, station: Station, scene: _Scene, *, epoch: int, goal: int, explore: bool) -> EpochRecord:
+        records: list[TrialRecord] = []
+        while not scene.latched[goal] and len(records) < self._protocol.trials:
+            record = self._run_trial(station, scene, epoch=epoch, goal=goal, trial=len(records) + 1, explore=explore)
+            records.append(record)
+            if record.attempt.outcome is TrialOutcome.VOID:
+                break
+            if explore:
+                self.goal_selector.update(record.attempt)
+                self.subgoal_selector.update(record.attempt)
+                self._stopwatch.lap("selectors")
+        is_void = bool(records) and records[-1].attempt.outcome is TrialOutcome.VOID
+        is_achieved = scene.latched[goal] and not is_void
+        return EpochRecord(epoch=epoch, goal=goal, is_achieved=is_achieved, is_void=is_void, trials=tuple(records))
+
+    # ------------------------------------------------------------------------------------------------------- trial
+
+    def _run_trial(
+        self, station: Station, scene: _Scene, *, epoch: int, goal: int, trial: int, explore: bool
+    ) -> TrialRecord:
+        state = scene.latched
+        temperature = self.goal_selector.temperature(goal)
+        subgoal = self.subgoal_selector.select(
+            goal=goal, state=state, available=scene.available(), temperature=temperature, explore=explore
+        )
+        self._stopwatch.lap("selectors")
+        predicted = self.experts.utility(subgoal, scene.percept)
+        skill = self.experts.skill(subgoal)
+        self.experts.begin_trial(subgoal, scene.percept, explore=explore)
+        outcome, n_steps = self._pursue(station, scene, subgoal)
+        self.experts.end_trial(outcome)
+        self._stopwatch.lap("training")
+        attempt = Attempt(
+            epoch=epoch,
+            goal=goal,
+            subgoal=subgoal,
+            state=state,
+            state_after=scene.latched,
+            outcome=outcome,
+            predicted=predicted,
+            skill=skill,
+            n_steps=n_steps,
+        )
+        return TrialRecord(trial=trial, attempt=attempt, temperature=temperature)
+
+    def _pursue(self, station: Station, scene: _Scene, subgoal: int) -> tuple[TrialOutcome, int]:
+        """Let the sub-goal's expert move the arm until the trial ends."""
+        lap, experts, protocol = self._stopwatch.lap, self.experts, self._protocol
+        n_at_place, is_blocked = 0, False
+        for step in range(1, protocol.steps + 1):
+            intent = experts.act(scene.percept)
+            lap("experts")
+            result = station.step(intent)
+            lap("station")
+            if result.is_void:
+                return TrialOutcome.VOID, step
+            came_about = self._take_in(scene, result.percept)
+            lap("judge")
+            experts.observe(result, came_about)
+            lap("experts")
+            if scene.holding[subgoal]:
+                return TrialOutcome.ACHIEVED, step
+            n_at_place = n_at_place + 1 if self.judge.is_at_place(subgoal, scene.percept) else 0
+            lap("judge")
+            is_blocked = is_blocked or n_at_place >= protocol.blocked_after
+            if is_blocked and protocol.end_blocked:
+                return TrialOutcome.BLOCKED, step
+        return TrialOutcome.BLOCKED if is_blocked else TrialOutcome.NOT_REACHED, protocol.steps
+
+    def _take_in(self, scene: _Scene, percept: Percept) -> GoalState:
+        """Judge the goals, latch them and return those that came about in this very step."""
+        before, now = scene.holding, self.judge.achieved(percept)
+        scene.percept = percept
+        if now == before:
+            return self._nothing
+        scene.holding = now
+        scene.latched = tuple(was_so or is_so for was_so, is_so in zip(scene.latched, now, strict=True))
+        return tuple(is_so and not was_so for is_so, was_so in zip(now, before, strict=True))

@@ -1,0 +1,235 @@
+"""What the figures of a run mean: mastered, learnt, recovered, optimal, right. Pure."""
+
+import itertools
+from collections.abc import Callable, Sequence
+from statistics import fmean
+
+import msgspec
+
+from learning.interfaces import GoalState
+from learning.rows import EvaluationRow, GoalRow
+
+__all__ = [
+    "Era",
+    "EraSummary",
+    "Summary",
+    "due_evaluations",
+    "eras",
+    "first_running",
+    "graph_errors",
+    "is_graph_right",
+    "is_mastered",
+    "optimal_trials",
+    "reachable_states",
+    "summarise",
+]
+
+Allowed = Callable[[int, GoalState], bool]
+"""Whether a goal can come about in a goal-state, under the rules in force."""
+
+MASTERED_SHARE = 0.9
+"""18 of 20."""
+SETTLED_EPOCHS = 200
+"""The last part of an era, on which trials over the optimum are taken."""
+STATES_LIMIT = 4096
+
+
+# ---------------------------------------------------------------------------------------------------- rules as a graph
+
+
+def reachable_states(allowed: Allowed, n_goals: int, *, limit: int = STATES_LIMIT) -> list[GoalState]:
+    """Return the goal-states that can be reached from none achieved, nearest first, at most `limit`."""
+    start: GoalState = (False,) * n_goals
+    states: list[GoalState] = [start]
+    seen: set[GoalState] = {start}
+    for state in states:
+        for goal in range(n_goals):
+            if state[goal] or not allowed(goal, state) or len(states) >= limit:
+                continue
+            following: GoalState = (*state[:goal], True, *state[goal + 1 :])
+            if following not in seen:
+                seen.add(following)
+                states.append(following)
+    return states
+
+
+def optimal_trials(allowed: Allowed, n_goals: int) -> tuple[int | None, ...]:
+    """Return for each goal the least number of trials that achieves it from none achieved; None where nothing can."""
+    best: list[int | None] = [None] * n_goals
+    for state in reachable_states(allowed, n_goals):
+        for goal in range(n_goals):
+            n_trials = sum(state) + 1
+            known = best[goal]
+            if not state[goal] and allowed(goal, state) and (known is None or n_trials < known):
+                best[goal] = n_trials
+    return tuple(best)
+
+
+def graph_errors(predicted: Allowed, allowed: Allowed, states: Sequence[GoalState], n_goals: int) -> list[int]:
+    """Return for each goal in how many of the states the prediction differs from the rules."""
+    return [sum(predicted(goal, state) != allowed(goal, state) for state in states) for goal in range(n_goals)]
+
+
+# ------------------------------------------------------------------------------------------------------- evaluations
+
+
+class Era(msgspec.Struct, frozen=True, kw_only=True):
+    """A span of epochs under the same rules: from_epoch <= epoch < until_epoch."""
+
+    from_epoch: int
+    until_epoch: int
+
+
+def eras(changes: Sequence[int], n_epochs: int) -> list[Era]:
+    """Return the eras of a run of n_epochs in which the rules change at the given epochs."""
+    edges = [0, *(change for change in sorted(changes) if 0 < change < n_epochs), n_epochs]
+    return [Era(from_epoch=start, until_epoch=end) for start, end in itertools.pairwise(edges)]
+
+
+def due_evaluations(
+    n_done: int, *, every: int, dense_every: int, dense_for: int, changes: Sequence[int], n_epochs: int
+) -> list[int]:
+    """Return under which epochs' rules to evaluate after n_done epochs; empty where nothing is due.
+
+    At a change of rules both the old and the new are looked at, so that the drop is seen before anything is relearnt.
+    """
+    if n_done == 0:
+        return []
+    if n_done in changes and n_done < n_epochs:
+        return [n_done - 1, n_done]
+    since = [n_done - start for start in (0, *changes) if 0 < n_done - start <= dense_for]
+    is_dense = any(elapsed % dense_every == 0 for elapsed in since)
+    is_due = n_done % every == 0 or is_dense or n_done == n_epochs
+    return [n_done - 1] if is_due else []
+
+
+def is_mastered(row: EvaluationRow) -> bool:
+    """Whether at least 18 of 20 test epochs succeeded."""
+    return row.n_tests > 0 and row.n_successes >= MASTERED_SHARE * row.n_tests
+
+
+def is_graph_right(rows: Sequence[EvaluationRow]) -> bool:
+    """Whether the learnt graph predicted what the rules say, for every goal in every state."""
+    return bool(rows) and all(row.graph_wrong == 0 for row in rows)
+
+
+def first_running(marks: Sequence[tuple[int, bool]], *, running: int) -> int | None:
+    """Return the epoch of the first of so many true marks running, None if there is none."""
+    count = 0
+    for i, (_, is_true) in enumerate(marks):
+        count = count + 1 if is_true else 0
+        if count == running:
+            return marks[i - running + 1][0]
+    return None
+
+
+# ----------------------------------------------------------------------------------------------------------- summary
+
+
+class EraSummary(msgspec.Struct, frozen=True, kw_only=True):
+    """What was reached under one set of rules. Epochs are counted from the era's start."""
+
+    from_epoch: int
+    until_epoch: int
+    learnt_after: int | None
+    """First of two evaluations running at which every goal is mastered: learnt, or recovered."""
+    graph_right_after: int | None
+    """First evaluation at which the learnt graph is right."""
+    success_by_goal: tuple[float | None, ...]
+    """Share of successes over the era's last 200 epochs' evaluations."""
+    trials_by_goal: tuple[float | None, ...]
+    """Mean trials of the successes, over the same evaluations."""
+    optimal_by_goal: tuple[int | None, ...]
+    trials_over_optimum: float | None
+    """Mean over goals of the trials beyond the optimum, successes only."""
+    trials_over_optimum_with_failures: float | None
+    """The same with a failure counting as all trials of an epoch."""
+
+
+class Summary(msgspec.Struct, frozen=True, kw_only=True):
+    """A run in a few figures."""
+
+    n_epochs: int
+    """Epochs learnt so far."""
+    n_trials: int
+    n_time_steps: int
+    """Decisions while learning."""
+    n_void_epochs: int
+    time_steps_to_all: int | None
+    """Decisions while learning until every goal was learnt under the first rules."""
+    choices_by_goal: tuple[int, ...]
+    eras: tuple[EraSummary, ...]
+
+
+def summarise(
+    goal_rows: Sequence[GoalRow],
+    evaluation_rows: Sequence[EvaluationRow],
+    *,
+    n_goals: int,
+    changes: Sequence[int],
+    optima: Sequence[Sequence[int | None]],
+) -> Summary:
+    """Return the figures of a run from its rows. optima: least trials of each goal, one sequence an era."""
+    n_epochs = len(goal_rows)
+    spans = eras(changes, n_epochs) if n_epochs else []
+    parts = tuple(
+        _summarise_era(
+            era, [row for row in evaluation_rows if era.from_epoch <= row.rules_epoch < era.until_epoch], best
+        )
+        for era, best in zip(spans, optima, strict=False)
+    )
+    learnt_at = parts[0].learnt_after if parts else None
+    return Summary(
+        n_epochs=n_epochs,
+        n_trials=sum(row.n_trials for row in goal_rows),
+        n_time_steps=sum(row.n_steps for row in goal_rows),
+        n_void_epochs=sum(row.is_void for row in goal_rows),
+        time_steps_to_all=None if learnt_at is None else sum(row.n_steps for row in goal_rows[:learnt_at]),
+        choices_by_goal=tuple(sum(row.goal == goal for row in goal_rows) for goal in range(n_goals)),
+        eras=parts,
+    )
+
+
+def _summarise_era(era: Era, rows: Sequence[EvaluationRow], optima: Sequence[int | None]) -> EraSummary:
+    by_epoch: dict[int, list[EvaluationRow]] = {}
+    for row in rows:
+        by_epoch.setdefault(row.epoch, []).append(row)
+    mastered = [(epoch, all(map(is_mastered, of_epoch))) for epoch, of_epoch in sorted(by_epoch.items())]
+    right = [(epoch, is_graph_right(of_epoch)) for epoch, of_epoch in sorted(by_epoch.items())]
+    settled_from = max(era.from_epoch, era.until_epoch - SETTLED_EPOCHS)
+    settled = [[row for row in rows if row.goal == goal and row.epoch > settled_from] for goal in range(len(optima))]
+    trials = tuple(_ratio(_total(of_goal, "trials_achieved"), _total(of_goal, "n_successes")) for of_goal in settled)
+    trials_all = [_ratio(_total(of_goal, "trials_all"), _total(of_goal, "n_tests")) for of_goal in settled]
+    return EraSummary(
+        from_epoch=era.from_epoch,
+        until_epoch=era.until_epoch,
+        learnt_after=_since(era, first_running(mastered, running=2)),
+        graph_right_after=_since(era, first_running(right, running=1)),
+        success_by_goal=tuple(
+            _ratio(_total(of_goal, "n_successes"), _total(of_goal, "n_tests")) for of_goal in settled
+        ),
+        trials_by_goal=trials,
+        optimal_by_goal=tuple(optima),
+        trials_over_optimum=_mean_excess(trials, optima),
+        trials_over_optimum_with_failures=_mean_excess(trials_all, optima),
+    )
+
+
+def _total(rows: Sequence[EvaluationRow], name: str) -> int:
+    return sum(getattr(row, name) for row in rows)
+
+
+def _ratio(part: int, whole: int) -> float | None:
+    return part / whole if whole else None
+
+
+def _since(era: Era, epoch: int | None) -> int | None:
+    return None if epoch is None else epoch - era.from_epoch
+
+
+def _mean_excess(trials: Sequence[float | None], optima: Sequence[int | None]) -> float | None:
+    """Mean of trials beyond the optimum over the goals that can be achieved; None if any was never achieved."""
+    excess = [(n, best) for n, best in zip(trials, optima, strict=True) if best is not None]
+    if not excess or any(n is None for n, _ in excess):
+        return None
+    return fmean(n - best for n, best in excess if n is not None)

@@ -1,0 +1,213 @@
+"""One epoch, as the paper tells it."""
+
+import numpy as np
+
+from config.learning import Experiment
+from learning.agent import Agent
+from learning.checkpoint import encode
+from learning.interfaces import TrialOutcome
+from learning.seeds import named_generator
+from tests.support.toy_learner import (
+    N_GOALS,
+    TOUCH_M,
+    ToyExperts,
+    ToyGoalSelector,
+    ToyJudge,
+    ToyStation,
+    ToySubgoalSelector,
+    make_toy_learner,
+)
+
+
+def free(goal, state, epoch):
+    return True
+
+
+class FixedGoal(ToyGoalSelector):
+    """Always the same goal; records what it is told."""
+
+    def __init__(self, goal):
+        super().__init__(np.random.default_rng(0))
+        self.goal = goal
+        self.ended = []
+
+    def select(self):
+        return self.goal
+
+    def end_epoch(self, goal, *, predicted, is_achieved):
+        self.ended.append((goal, predicted, is_achieved))
+
+
+class Sequence(ToySubgoalSelector):
+    """Chooses sub-goals from a list, over and over; records what was available."""
+
+    def __init__(self, *subgoals):
+        super().__init__(np.random.default_rng(0))
+        self.subgoals = subgoals
+        self.seen = []
+
+    def select(self, *, goal, state, available, temperature, explore):
+        self.seen.append((state, available))
+        return self.subgoals[(len(self.seen) - 1) % len(self.subgoals)]
+
+
+class FadingJudge(ToyJudge):
+    """Goal 1 holds only while the tool is near its lamp: it can be lost again."""
+
+    def achieved(self, percept):
+        lit = list(super().achieved(percept))
+        lit[1] = lit[1] and percept.distances_m[1] < TOUCH_M
+        return tuple(lit)
+
+
+class Idle(ToyExperts):
+    """Never moves."""
+
+    def act(self, percept):
+        return super().act(percept).__class__(heading_rad=0.0, distance_m=0.0, height_m=0.05)
+
+
+def skilled(kind=ToyExperts):
+    experts = kind(np.random.default_rng(0))
+    experts.load_state_dict({**experts.state_dict(), "worth": 9.0 * np.eye(N_GOALS)})
+    return experts
+
+
+def agent_for(goal, subgoals, *, experts=None, judge=None, **protocol):
+    return Agent(
+        goal_selector=FixedGoal(goal),
+        subgoal_selector=Sequence(*subgoals),
+        experts=experts or skilled(),
+        judge=judge or ToyJudge(),
+        protocol=Experiment(**protocol),
+    )
+
+
+def learn(agent, allowed=free, **station):
+    return agent.learn_epoch(ToyStation(allowed, **station), epoch=5, seed=3)
+
+
+def outcomes(record):
+    return [entry.attempt.outcome for entry in record.trials]
+
+
+def test_an_epoch_ends_when_its_goal_is_achieved():
+    record = learn(agent_for(2, (0, 1, 2, 3)))
+    assert record.is_achieved
+    assert [entry.attempt.subgoal for entry in record.trials] == [0, 1, 2]
+    assert outcomes(record) == [TrialOutcome.ACHIEVED] * 3
+    assert [entry.trial for entry in record.trials] == [1, 2, 3]
+
+
+def test_an_epoch_has_eight_trials_at_most_and_a_trial_seventy_steps():
+    record = learn(agent_for(2, (2,), experts=skilled(Idle)))
+    assert not record.is_achieved
+    assert outcomes(record) == [TrialOutcome.NOT_REACHED] * 8
+    assert [entry.attempt.n_steps for entry in record.trials] == [70] * 8
+    assert record.n_steps == 560
+
+
+def test_what_was_achieved_stays_in_the_state_for_the_epoch_and_only_for_it():
+    agent = agent_for(2, (0, 1, 2))
+    record = learn(agent)
+    assert [entry.attempt.state for entry in record.trials] == [
+        (False, False, False, False),
+        (True, False, False, False),
+        (True, True, False, False),
+    ]
+    assert record.trials[-1].attempt.state_after == (True, True, True, False)
+    assert learn(agent).trials[0].attempt.state == (False, False, False, False)
+
+
+def test_a_place_reached_to_no_effect_ends_the_trial_after_three_steps_as_blocked():
+    record = learn(agent_for(2, (2,)), allowed=lambda goal, state, epoch: goal != 2)
+    assert outcomes(record) == [TrialOutcome.BLOCKED] * 8
+    # From the second trial on the tool is there already.
+    assert [entry.attempt.n_steps for entry in record.trials[1:]] == [3] * 7
+
+
+def test_a_blocked_trial_may_be_let_run_to_its_timeout():
+    record = learn(agent_for(2, (2,), end_blocked=False), allowed=lambda goal, state, epoch: goal != 2)
+    assert outcomes(record) == [TrialOutcome.BLOCKED] * 8
+    assert [entry.attempt.n_steps for entry in record.trials] == [70] * 8
+
+
+def test_passing_a_place_for_fewer_steps_is_not_blocked():
+    agent = agent_for(2, (2,), steps=8, blocked_after=9, end_blocked=False)
+    record = learn(agent, allowed=lambda goal, state, epoch: goal != 2)
+    assert set(outcomes(record)) == {TrialOutcome.NOT_REACHED}
+
+
+def test_a_goal_reached_by_accident_is_latched_and_ends_the_epoch_after_the_trial():
+    experts = ToyExperts(np.random.default_rng(0))
+    heads_for_2 = np.zeros((N_GOALS, N_GOALS))
+    heads_for_2[:, 2] = 9.0
+    experts.load_state_dict({**experts.state_dict(), "worth": heads_for_2})
+    record = learn(agent_for(2, (0,), experts=experts))
+    assert record.is_achieved
+    assert outcomes(record) == [TrialOutcome.NOT_REACHED]
+    assert record.trials[0].attempt.state_after == (False, False, True, False)
+
+
+def test_a_goal_that_was_lost_again_may_be_chosen_again_and_one_that_holds_may_not():
+    agent = agent_for(3, (1, 0, 1, 3), judge=FadingJudge())
+    record = learn(agent)
+    states, available = zip(*agent.subgoal_selector.seen, strict=True)
+    assert available == (
+        (True, True, True, True),
+        (True, False, True, True),
+        (False, True, True, True),
+        (False, False, True, True),
+    )
+    assert states[2] == (True, True, False, False)
+    assert outcomes(record) == [TrialOutcome.ACHIEVED] * 4
+
+
+def test_a_void_trial_ends_the_epoch_and_teaches_nothing():
+    learner = make_toy_learner(0, Experiment(), void_epochs=(5,))
+    agent = learner.agent
+    for epoch in range(5):
+        agent.learn_epoch(learner.station, epoch=epoch, seed=epoch)
+    before = agent.state_dict()
+    n_attempts = len(agent.goal_selector.attempts)
+    record = agent.learn_epoch(learner.station, epoch=5, seed=5)
+    after = agent.state_dict()
+    assert record.is_void
+    assert not record.is_achieved
+    assert outcomes(record) == [TrialOutcome.VOID]
+    assert len(agent.goal_selector.attempts) == n_attempts
+    for layer in before:
+        before[layer].pop("rng"), after[layer].pop("rng")
+    assert encode(before) == encode(after)
+
+
+def test_the_goal_selector_hears_of_every_epoch_but_void_ones():
+    agent = agent_for(2, (2,))
+    learn(agent)
+    assert agent.goal_selector.ended == [(2, 9.0, True)]
+    learn(agent, void_epochs=(5,))
+    assert len(agent.goal_selector.ended) == 1
+
+
+def test_prediction_and_skill_are_said_before_the_trial():
+    agent = agent_for(2, (2,))
+    attempt = learn(agent).trials[0].attempt
+    assert (attempt.predicted, attempt.skill) == (9.0, 0.5)
+    assert agent.experts.skill(2) == 0.6
+
+
+def test_a_test_epoch_changes_nothing_learnt_and_draws_nothing():
+    learner = make_toy_learner(1, Experiment())
+    for epoch in range(20):
+        learner.agent.learn_epoch(learner.station, epoch=epoch, seed=epoch)
+    before = encode(learner.agent.state_dict())
+    records = [learner.agent.test_epoch(learner.station, epoch=3, seed=9, goal=goal) for goal in range(N_GOALS)]
+    assert encode(learner.agent.state_dict()) == before
+    assert [record.goal for record in records] == [0, 1, 2, 3]
+    assert learner.agent.test_epoch(learner.station, epoch=3, seed=9, goal=3) == records[3]
+
+
+def test_generators_of_different_names_are_different_and_of_one_name_the_same():
+    assert named_generator(4, "goals").random() == named_generator(4, "goals").random()
+    assert named_generator(4, "goals").random() != named_generator(4, "subgoals").random()
+    assert named_generator(4, "goals").random() != named_generator(5, "goals").random()

@@ -1,0 +1,213 @@
+"""What a run's figures mean, by hand-worked cases."""
+
+import pytest
+
+from learning.errors import RunFolderError
+from learning.interfaces import TrialOutcome
+from learning.metrics import (
+    Era,
+    due_evaluations,
+    eras,
+    first_running,
+    graph_errors,
+    is_graph_right,
+    is_mastered,
+    optimal_trials,
+    reachable_states,
+    summarise,
+)
+from learning.rows import EvaluationRow, GoalRow, TrialRow, cells, header, read_rows
+from learning.tables import Tables
+
+
+def before(goal, state):
+    """The paper's rules before the change."""
+    return (True, True, True, state[1], state[2], state[4])[goal]
+
+
+def after(goal, state):
+    """The paper's rules after the change."""
+    return (True, True, True, not state[1], not state[2], state[4] and state[0])[goal]
+
+
+def row(epoch, goal=0, *, rules_epoch=None, hits=20, tests=20, trials=1, wrong=0):
+    return EvaluationRow(
+        epoch=epoch,
+        rules_epoch=epoch - 1 if rules_epoch is None else rules_epoch,
+        goal=goal,
+        n_tests=tests,
+        n_successes=hits,
+        n_void=0,
+        trials_achieved=hits * trials,
+        trials_all=hits * trials + (tests - hits) * 8,
+        n_steps=100,
+        graph_cases=4,
+        graph_wrong=wrong,
+    )
+
+
+def choice(epoch, goal=0, steps=10):
+    return GoalRow(epoch=epoch, goal=goal, is_achieved=1, is_void=0, n_trials=2, n_steps=steps)
+
+
+def test_the_papers_optimal_trials_follow_from_its_rules():
+    assert optimal_trials(before, 6) == (1, 1, 1, 2, 2, 3)
+    assert optimal_trials(after, 6) == (1, 1, 1, 1, 1, 3)
+
+
+def test_a_goal_that_nothing_allows_has_no_optimum():
+    assert optimal_trials(lambda goal, state: goal == 0, 2) == (1, None)
+
+
+def test_only_states_that_the_rules_let_come_about_are_reachable():
+    # Red and blue grabbed need their buttons: of 64 states those with 3 and not 1, 4 and not 2, 5 and not 4 are out.
+    states = reachable_states(before, 6)
+    assert len(states) == len(set(states)) == 2 * 3 * 4
+    assert all(state[1] or not state[3] for state in states)
+    assert states[0] == (False,) * 6
+
+
+def test_no_more_states_are_looked_at_than_the_limit():
+    assert len(reachable_states(lambda goal, state: True, 10, limit=100)) == 100
+
+
+def test_graph_errors_count_states_predicted_wrongly():
+    states = reachable_states(after, 6)
+    assert graph_errors(after, after, states, 6) == [0] * 6
+    errors = graph_errors(before, after, states, 6)
+    assert errors[:3] == [0, 0, 0]
+    # Goal 3: before it needs 1, after it needs not 1: wrong everywhere.
+    assert errors[3] == len(states)
+    assert 0 < errors[5] < len(states)
+
+
+def test_evaluations_are_due_every_so_often_densely_after_changes_and_twice_at_a_change():
+    protocol = {"every": 50, "dense_every": 10, "dense_for": 30, "changes": [100], "n_epochs": 205}
+    due = {n: rules for n in range(206) if (rules := due_evaluations(n, **protocol))}
+    assert due == {
+        10: [9], 20: [19], 30: [29], 50: [49], 100: [99, 100], 110: [109], 120: [119], 130: [129], 150: [149],
+        200: [199], 205: [204],
+    }  # fmt: skip
+
+
+def test_eras_lie_between_changes():
+    assert eras([1000], 2000) == [Era(from_epoch=0, until_epoch=1000), Era(from_epoch=1000, until_epoch=2000)]
+    assert eras([1000], 700) == [Era(from_epoch=0, until_epoch=700)]
+    assert eras([], 5) == [Era(from_epoch=0, until_epoch=5)]
+
+
+@pytest.mark.parametrize(("hits", "tests", "mastered"), [(18, 20, True), (17, 20, False), (9, 10, True), (0, 0, False)])
+def test_mastered_is_eighteen_of_twenty(hits, tests, mastered):
+    assert is_mastered(row(10, hits=hits, tests=tests)) is mastered
+
+
+def test_learnt_is_the_first_of_two_evaluations_running():
+    marks = [(10, True), (20, False), (30, True), (40, True), (50, True)]
+    assert first_running(marks, running=2) == 30
+    assert first_running(marks, running=1) == 10
+    assert first_running(marks, running=4) is None
+    assert first_running([], running=1) is None
+
+
+def test_a_graph_is_right_only_where_it_was_compared_and_never_wrong():
+    assert is_graph_right([row(10, 0), row(10, 1)])
+    assert not is_graph_right([row(10, 0), row(10, 1, wrong=1)])
+    assert not is_graph_right([])
+
+
+def test_a_summary_worked_by_hand():
+    evaluations = [
+        row(50, 0), row(50, 1, hits=17),
+        row(100, 0), row(100, 1, trials=3, wrong=2),
+        row(100, 0, rules_epoch=100, hits=0, wrong=1), row(100, 1, rules_epoch=100),
+        row(150, 0), row(150, 1, trials=2),
+        row(200, 0, hits=18), row(200, 1, trials=3),
+    ]  # fmt: skip
+    goals = [choice(epoch, goal=epoch % 2) for epoch in range(200)]
+    summary = summarise(goals, evaluations, n_goals=2, changes=[100], optima=[(1, 2), (1, 2)])
+    first, second = summary.eras
+    assert (summary.n_epochs, summary.n_trials, summary.n_time_steps) == (200, 400, 2000)
+    assert summary.choices_by_goal == (100, 100)
+    assert summary.time_steps_to_all is None
+    assert (first.learnt_after, first.graph_right_after) == (None, 50)
+    assert (second.learnt_after, second.graph_right_after) == (50, 50)
+    assert second.success_by_goal == (38 / 40, 1.0)
+    assert second.trials_by_goal == (1.0, 2.5)
+    assert second.trials_over_optimum == pytest.approx((0.0 + 0.5) / 2)
+    # Goal 0: 38 tests of one trial, two failures of eight.
+    assert second.trials_over_optimum_with_failures == pytest.approx(((38 + 16) / 40 - 1 + 0.5) / 2)
+
+
+def test_time_steps_to_all_are_those_before_everything_was_learnt():
+    evaluations = [row(50), row(100), row(150)]
+    goals = [choice(epoch, steps=epoch) for epoch in range(150)]
+    summary = summarise(goals, evaluations, n_goals=1, changes=[], optima=[(1,)])
+    assert summary.eras[0].learnt_after == 50
+    assert summary.time_steps_to_all == sum(range(50))
+
+
+def test_only_the_last_two_hundred_epochs_of_an_era_count_as_settled():
+    evaluations = [row(800, hits=0), row(801, trials=1), row(1000, trials=1)]
+    goals = [choice(epoch) for epoch in range(1000)]
+    summary = summarise(goals, evaluations, n_goals=1, changes=[], optima=[(1,)])
+    assert summary.eras[0].success_by_goal == (1.0,)
+
+
+def trial_row(epoch=0, predicted=0.1):
+    return TrialRow(
+        epoch=epoch, trial=1, goal=0, subgoal=1, state="00", state_after="01", outcome=TrialOutcome.BLOCKED, n_steps=3,
+        predicted=predicted, skill=1 / 3, temperature=0.01,
+    )  # fmt: skip
+
+
+def test_rows_read_back_as_they_were_written(tmp_path):
+    rows = [trial_row(predicted=value) for value in (0.1 + 0.2, 5e-324, 1.0)]
+    evaluations = [row(10), EvaluationRow(**{**asdict(row(20)), "graph_cases": None, "graph_wrong": None})]
+    with Tables(tmp_path) as tables:
+        tables.append("trials", rows)
+        tables.append("evaluations", evaluations)
+    assert read_rows(tmp_path / "trials.csv", TrialRow) == rows
+    assert read_rows(tmp_path / "evaluations.csv", EvaluationRow) == evaluations
+    assert read_rows(tmp_path / "goals.csv", GoalRow) == []
+
+
+def test_a_torn_last_line_is_left_out(tmp_path):
+    path = tmp_path / "goals.csv"
+    lines = [header(GoalRow), cells(choice(0)), cells(choice(1))]
+    path.write_text("\n".join(lines)[:-3])
+    assert read_rows(path, GoalRow) == [choice(0)]
+
+
+@pytest.mark.parametrize(
+    "text", ["", "epoch,other\n1,2\n", "epoch,goal,is_achieved,is_void,n_trials,n_steps\n1,2,x,0,1,1\n"]
+)
+def test_what_is_no_such_table_is_refused(tmp_path, text):
+    path = tmp_path / "goals.csv"
+    path.write_text(text)
+    with pytest.raises(RunFolderError, match=r"goals\.csv"):
+        read_rows(path, GoalRow)
+    with pytest.raises(RunFolderError, match="absent"):
+        read_rows(tmp_path / "absent.csv", GoalRow)
+
+
+def test_tables_are_cut_back_to_a_checkpoints_offsets_and_go_on_from_there(tmp_path):
+    with Tables(tmp_path) as tables:
+        tables.append("trials", [trial_row(0)])
+        offsets = {name: tables.offset(name) for name in ("trials", "goals", "evaluations")}
+        tables.append("trials", [trial_row(1), trial_row(2)])
+    whole = (tmp_path / "trials.csv").read_bytes()
+    with Tables(tmp_path, offsets=offsets) as tables:
+        tables.append("trials", [trial_row(1), trial_row(2)])
+        assert tables.offset("trials") == len(whole)
+    assert (tmp_path / "trials.csv").read_bytes() == whole
+
+
+def test_a_table_shorter_than_its_checkpoint_knows_is_refused(tmp_path):
+    with Tables(tmp_path) as tables:
+        offsets = {name: tables.offset(name) for name in ("trials", "goals", "evaluations")}
+    with pytest.raises(RunFolderError, match="at least"):
+        Tables(tmp_path, offsets={**offsets, "goals": 10_000})
+
+
+def asdict(value):
+    return {name: getattr(value, name) for name in value.__struct_fields__}
