@@ -82,6 +82,7 @@ class Expert(Section, frozen=True, kw_only=True):
     buffer_steps: Count = 20_000
     established_after: Count = 10
     """Successes after which the expert alone moves the arm."""
+    gate_power: NonNegative = 1.0
     horizon: Count = 70
     """Steps over which utility falls from 1 to 0 along a success trace."""
     failure_share: Share = 0.3

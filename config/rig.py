@@ -8,13 +8,13 @@ from config.values import Name, Section
 
 __all__ = ["PlantExpected", "Rig"]
 
-ImportString = Annotated[str, Meta(pattern=r"^[a-z_][a-z0-9_.]*:[A-Za-z_][A-Za-z0-9_]*$")]
+ImportString = Annotated[str, Meta(pattern=r"^[a-z_][a-z0-9_.]*:[A-Za-z_][A-Za-z0-9_]*\Z")]
 
 
 class PlantExpected(Section, frozen=True, kw_only=True):
     """What the plant must say it is before anything is armed."""
 
-    kind: Annotated[str, Meta(pattern=r"^(real|virtual|twin|fake)$")]
+    kind: Annotated[str, Meta(pattern=r"^(real|virtual|twin|fake)\Z")]
     model: str
     serial: str
 

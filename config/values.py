@@ -7,7 +7,7 @@ from msgspec import Meta
 
 __all__ = ["Angle", "Colour", "Length", "Mass", "Name", "NonNegative", "Point", "Positive", "Section", "Share", "Span"]
 
-Name = Annotated[str, Meta(pattern=r"^[a-z][a-z0-9_]*$", max_length=48)]
+Name = Annotated[str, Meta(pattern=r"^[a-z][a-z0-9_]*\Z", max_length=48)]
 Length = Annotated[float, Meta(ge=-3.0, le=3.0)]
 Span = Annotated[float, Meta(gt=0.0, le=3.0)]
 Angle = Annotated[float, Meta(ge=-6.2831853072, le=6.2831853072)]

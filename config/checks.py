@@ -1,0 +1,221 @@
+"""What must hold between the values of one file, beyond each value's own range."""
+
+import math
+from collections.abc import Callable, Iterable, Sequence
+
+from config.arm import ArmConfig
+from config.decode import nearest
+from config.errors import ConfigError
+from config.learning import LearningConfig
+from config.rig import Rig
+from config.rules import RuleSet
+from config.scenario import Cylinder, Goal, GoalKind, Scenario
+from config.yaml_text import join
+
+__all__ = ["RESERVED_NAMES", "check_arm", "check_learning", "check_rig", "check_rules", "check_scenario"]
+
+RESERVED_NAMES = ("table", "gripper", "hand", "tool", "world")
+"""Names that mean something by themselves in distances, rules or the simulated world."""
+
+
+class _Checker:
+    """Raises for the first thing that does not hold, naming file and place."""
+
+    def __init__(self, file: str) -> None:
+        self._file = file
+
+    def need(self, holds: bool, where: str, expected: str, got: str) -> None:
+        """Raise unless it holds."""
+        if not holds:
+            raise ConfigError(self._file, where, expected, got)
+
+    def known(self, name: str, known: Iterable[str], where: str, what: str) -> None:
+        """Raise unless the name is one of the known ones."""
+        names = list(known)
+        self.need(
+            name in names, where, f"{what}: {', '.join(names) or 'there is none'}", f"{name}{nearest(name, names)}"
+        )
+
+    def unique(self, values: Iterable[tuple[str, object]], what: str) -> None:
+        """Raise where a value comes a second time; values come with their places."""
+        first: dict[object, str] = {}
+        for where, value in values:
+            self.need(value not in first, where, f"{what} used once", f"{value} again, after {first.get(value)}")
+            first[value] = where
+
+    def ascending(self, pair: Sequence[float], where: str) -> None:
+        """Raise unless the first of two values is the lesser."""
+        self.need(pair[0] < pair[1], where, "the lesser value first", f"{pair[0]:g} and {pair[1]:g}")
+
+
+def check_arm(arm: ArmConfig, file: str) -> None:
+    """Check ranges, tool and motion limits of an arm."""
+    checker = _Checker(file)
+    checker.unique(((f"joints[{i}].name", joint.name) for i, joint in enumerate(arm.joints)), "a joint name")
+    for i, (joint, home_rad) in enumerate(zip(arm.joints, arm.home_rad, strict=True)):
+        low, high = joint.range_rad
+        checker.ascending(joint.range_rad, f"joints[{i}].range_rad")
+        checker.need(low <= home_rad <= high, f"home_rad[{i}]", f"an angle from {low:g} to {high:g}", f"{home_rad:g}")
+    for i, capsule in enumerate(arm.capsules):
+        length_m = math.dist(capsule.from_m, capsule.to_m)
+        checker.need(length_m > 1e-4, f"capsules[{i}].to_m", "another point than from_m", "the same point")
+    _check_tool(arm, checker)
+    _check_motion(arm, checker)
+
+
+def _check_tool(arm: ArmConfig, checker: _Checker) -> None:
+    tool = arm.tool
+    checker.ascending(tool.force_n, "tool.force_n")
+    checker.ascending(tool.speed_m_s, "tool.speed_m_s")
+    low, high = tool.force_n
+    checker.need(
+        low <= tool.grip_force_n <= high,
+        "tool.grip_force_n",
+        f"a force from {low:g} to {high:g}",
+        f"{tool.grip_force_n:g}",
+    )
+    reach_m = tool.tcp_m[2] - tool.finger_depth_m
+    checker.need(
+        reach_m > 0.0, "tool.finger_depth_m", f"less than tcp_m[2] = {tool.tcp_m[2]:g}", f"{tool.finger_depth_m:g}"
+    )
+
+
+def _check_motion(arm: ArmConfig, checker: _Checker) -> None:
+    motion, low, high = arm.motion, *arm.motion.workspace_m
+    for axis in range(3):
+        checker.ascending((low[axis], high[axis]), f"motion.workspace_m[1][{axis}]")
+    checker.ascending(motion.heights_m, "motion.heights_m")
+    tip_m = motion.heights_m[0] - arm.tool.tip_below_tcp_m
+    checker.need(
+        tip_m >= motion.table_clearance_m,
+        "motion.heights_m[0]",
+        f"at least {motion.table_clearance_m + arm.tool.tip_below_tcp_m:g}, tip_below_tcp_m and table_clearance_m",
+        f"{motion.heights_m[0]:g}",
+    )
+    checker.need(
+        motion.leash_m >= motion.max_step_m,
+        "motion.leash_m",
+        f"at least max_step_m = {motion.max_step_m:g}",
+        f"{motion.leash_m:g}",
+    )
+    checker.need(
+        motion.contact_force_n < motion.force_limit_n,
+        "motion.contact_force_n",
+        f"less than force_limit_n = {motion.force_limit_n:g}",
+        f"{motion.contact_force_n:g}",
+    )
+
+
+def check_rig(rig: Rig, file: str) -> None:
+    """Check that a rig's ticks are made of whole physics steps."""
+    n_steps = rig.tick_s / rig.physics_s
+    is_whole = n_steps >= 0.5 and abs(n_steps - round(n_steps)) < 1e-6
+    _Checker(file).need(is_whole, "physics_s", f"a whole part of tick_s = {rig.tick_s:g}", f"{rig.physics_s:g}")
+
+
+def check_learning(learning: LearningConfig, file: str) -> None:
+    """Check that a learner can move and can fill its batches."""
+    checker = _Checker(file)
+    shares = learning.actions.distance_shares
+    checker.need(max(shares) > 0.0, "actions.distance_shares", "at least one share above 0", "only 0")
+    expert = learning.expert
+    checker.need(
+        expert.batch <= expert.buffer_steps,
+        "expert.batch",
+        f"at most buffer_steps = {expert.buffer_steps}",
+        f"{expert.batch}",
+    )
+
+
+def check_rules(rules: RuleSet, file: str) -> None:
+    """Check a rule set by itself: one rule an output, each input once a rule and without contradiction."""
+    checker = _Checker(file)
+    checker.unique(((f"rules[{i}].output", rule.output) for i, rule in enumerate(rules.rules)), "an output")
+    for i, rule in enumerate(rules.rules):
+        is_on_by_input: dict[str, bool] = {}
+        for k, literal in enumerate(rule.when):
+            before = is_on_by_input.setdefault(literal.input, literal.is_on)
+            got = f"{literal.input} again" if before == literal.is_on else f"{literal.input} on and off at once"
+            is_first = literal.input not in [earlier.input for earlier in rule.when[:k]]
+            checker.need(is_first, f"rules[{i}].when[{k}].input", "each input once, so that the rule can hold", got)
+
+
+def check_scenario(scenario: Scenario, file: str) -> None:
+    """Check names, wiring, references, goals and schedule of a scenario. Its geometry is checked in config.placing."""
+    checker = _Checker(file)
+    _check_names(scenario, checker)
+    _check_wiring(scenario, checker)
+    boxes = [box.name for box in scenario.boxes]
+    for i, cylinder in enumerate(scenario.cylinders):
+        _check_cylinder(cylinder, boxes, f"cylinders[{i}]", checker)
+    _check_distances(scenario, checker)
+    for i, goal in enumerate(scenario.goals):
+        _check_goal(goal, scenario, f"goals[{i}]", checker)
+    starts = [span.from_epoch for span in scenario.schedule]
+    checker.need(starts[0] == 0, "schedule[0].from_epoch", "0, the first epoch", f"{starts[0]}")
+    for i in range(1, len(starts)):
+        expected = f"an epoch after {starts[i - 1]}"
+        checker.need(starts[i] > starts[i - 1], f"schedule[{i}].from_epoch", expected, f"{starts[i]}")
+
+
+def _check_names(scenario: Scenario, checker: _Checker) -> None:
+    groups = {"buttons": scenario.buttons, "boxes": scenario.boxes, "cylinders": scenario.cylinders}
+    places = [(f"{group}[{i}].name", thing.name) for group, things in groups.items() for i, thing in enumerate(things)]
+    checker.unique(places, "a name")
+    for where, name in places:
+        checker.need(name not in RESERVED_NAMES, where, f"a name other than {', '.join(RESERVED_NAMES)}", name)
+    checker.unique(((f"goals[{i}].name", goal.name) for i, goal in enumerate(scenario.goals)), "a goal's name")
+
+
+def _check_wiring(scenario: Scenario, checker: _Checker) -> None:
+    buttons = list(enumerate(scenario.buttons))
+    boxes = list(enumerate(scenario.boxes))
+    inputs = [(f"buttons[{i}].input", button.input) for i, button in buttons]
+    inputs += [(f"boxes[{i}].presence_input", box.presence_input) for i, box in boxes if box.presence_input is not None]
+    outputs = [(f"buttons[{i}].lamp_output", button.lamp_output) for i, button in buttons]
+    outputs += [(f"boxes[{i}].lid.output", box.lid.output) for i, box in boxes if box.lid is not None]
+    checker.unique(inputs, "a digital input")
+    checker.unique(outputs, "a digital output")
+
+
+def _check_cylinder(cylinder: Cylinder, boxes: list[str], where: str, checker: _Checker) -> None:
+    if cylinder.inside is not None:
+        checker.known(cylinder.inside, boxes, join(where, "inside"), "a box")
+    if cylinder.receptacle is not None:
+        checker.known(cylinder.receptacle, boxes, join(where, "receptacle"), "a box")
+        elsewhere = cylinder.receptacle != cylinder.inside
+        checker.need(elsewhere, join(where, "receptacle"), "another box than it starts in", cylinder.receptacle)
+
+
+def _check_distances(scenario: Scenario, checker: _Checker) -> None:
+    things = [thing.name for group in (scenario.buttons, scenario.boxes, scenario.cylinders) for thing in group]
+    for i, name in enumerate(scenario.distances):
+        checker.known(name, [*things, "table"], f"distances[{i}]", "an object or table")
+    checker.unique(((f"distances[{i}]", name) for i, name in enumerate(scenario.distances)), "a distance")
+
+
+def _check_goal(goal: Goal, scenario: Scenario, where: str, checker: _Checker) -> None:
+    of_kind: dict[GoalKind, Callable[[], None]] = {
+        GoalKind.PRESSED: lambda: checker.known(
+            goal.object, (button.name for button in scenario.buttons), join(where, "object"), "a button"
+        ),
+        GoalKind.GRABBED: lambda: _check_goal_cylinder(goal, scenario, where, checker),
+        GoalKind.IN_BOX: lambda: _check_goal_in_box(goal, scenario, where, checker),
+    }
+    of_kind[goal.kind]()
+    if goal.kind is not GoalKind.IN_BOX:
+        checker.need(goal.box is None, join(where, "box"), f"no box for kind {goal.kind.value}", f"{goal.box}")
+
+
+def _check_goal_cylinder(goal: Goal, scenario: Scenario, where: str, checker: _Checker) -> None:
+    names = [cylinder.name for cylinder in scenario.cylinders if not cylinder.is_distractor]
+    checker.known(goal.object, names, join(where, "object"), "a cylinder that is no distractor")
+
+
+def _check_goal_in_box(goal: Goal, scenario: Scenario, where: str, checker: _Checker) -> None:
+    _check_goal_cylinder(goal, scenario, where, checker)
+    checker.need(goal.box is not None, join(where, "box"), "a box, since the kind is in_box", "nothing")
+    checker.known(goal.box or "", (box.name for box in scenario.boxes), join(where, "box"), "a box")
+    cylinder = next(cylinder for cylinder in scenario.cylinders if cylinder.name == goal.object)
+    expected = f"{cylinder.receptacle or 'nothing'}, the receptacle that the hand opens over"
+    checker.need(goal.box == cylinder.receptacle, join(where, "box"), expected, f"{goal.box}")

@@ -1,0 +1,202 @@
+"""Loads and checks config files, shipped by name or by a path of the user's own."""
+
+from pathlib import Path
+from typing import TypeVar
+
+import msgspec
+
+from config.arm import ArmConfig
+from config.checks import check_arm, check_learning, check_rig, check_rules, check_scenario
+from config.decode import decode
+from config.errors import ConfigError
+from config.learning import LearningConfig
+from config.placing import check_fit, check_placing
+from config.resolved import Resolved
+from config.rig import Rig
+from config.rules import RuleSet
+from config.scenario import Scenario
+from config.sources import Source, read_path, read_source
+from config.wiring import check_reachable, check_wiring
+from config.yaml_text import parse_yaml
+
+__all__ = [
+    "load_arm",
+    "load_learning",
+    "load_resolved",
+    "load_rig",
+    "load_rules",
+    "load_scenario",
+    "load_wired",
+    "resolve",
+]
+
+S = TypeVar("S", bound=msgspec.Struct)
+WHOLE_TICKS = 1e-6
+
+
+class _Files(msgspec.Struct, frozen=True, kw_only=True):
+    """What errors call the files that a Resolved came from."""
+
+    rig: str
+    arm: str
+    scenario: str
+    rule_sets: tuple[str, ...]
+    learning: str
+
+
+def load_arm(name: str | Path, *, base: Path | None = None) -> ArmConfig:
+    """Return an arm: `ur5e`, or a path, relative ones starting from base."""
+    return _load_arm(read_source("arms", name, base=base))
+
+
+def load_rig(name: str | Path) -> Rig:
+    """Return a rig: `twin`, or a path. Its arm's file is not looked at."""
+    return _load_rig(read_source("rigs", name))
+
+
+def load_learning(name: str | Path) -> LearningConfig:
+    """Return a learner's preset: `default`, `paper`, `group`, or a path."""
+    return _load_learning(read_source("learning", name))
+
+
+def load_rules(name: str | Path, *, base: Path | None = None) -> RuleSet:
+    """Return a rule set: a shipped one's name, or a path, relative ones starting from base."""
+    return _load_rules(read_source("rules", name, base=base))
+
+
+def load_scenario(name: str | Path) -> Scenario:
+    """Return a scenario: `paper`, `workshop`, or a path. Its rule sets are checked too."""
+    return load_wired(name)[0]
+
+
+def load_wired(name: str | Path) -> tuple[Scenario, tuple[RuleSet, ...]]:
+    """Return a scenario and the rule sets of its schedule, in its order."""
+    scenario, rule_sets, _, _ = _load_wired(name)
+    return scenario, rule_sets
+
+
+def resolve(*, rig: str | Path = "twin", scenario: str | Path = "paper", learning: str | Path = "default") -> Resolved:
+    """Return everything that a run is made of, checked together.
+
+    Raises:
+        ConfigError: a file is missing or wrong, or the files do not fit one another.
+    """
+    rig_source = read_source("rigs", rig)
+    loaded_rig = _load_rig(rig_source)
+    arm_source = read_source("arms", loaded_rig.arm, base=rig_source.folder)
+    loaded_scenario, rule_sets, scenario_file, rule_files = _load_wired(scenario)
+    learning_source = read_source("learning", learning)
+    resolved = Resolved(
+        rig=loaded_rig,
+        arm=_load_arm(arm_source),
+        scenario=loaded_scenario,
+        rule_sets=rule_sets,
+        learning=_load_learning(learning_source),
+    )
+    files = _Files(
+        rig=rig_source.file,
+        arm=arm_source.file,
+        scenario=scenario_file,
+        rule_sets=rule_files,
+        learning=learning_source.file,
+    )
+    _check_together(resolved, files)
+    return resolved
+
+
+def load_resolved(path: Path) -> Resolved:
+    """Return what dump_resolved wrote, such as the config of a run folder, checked as if it came from its files."""
+    source = read_path(path)
+    resolved = _decode(source, Resolved)
+    n_spans, n_sets = len(resolved.scenario.schedule), len(resolved.rule_sets)
+    if n_spans != n_sets:
+        raise ConfigError(source.file, "rule_sets", f"{n_spans}, one for each span of the schedule", f"{n_sets}")
+    files = _Files(
+        rig=f"{source.file}: rig",
+        arm=f"{source.file}: arm",
+        scenario=f"{source.file}: scenario",
+        rule_sets=tuple(f"{source.file}: rule_sets[{i}]" for i in range(n_sets)),
+        learning=f"{source.file}: learning",
+    )
+    check_rig(resolved.rig, files.rig)
+    check_arm(resolved.arm, files.arm)
+    check_learning(resolved.learning, files.learning)
+    check_scenario(resolved.scenario, files.scenario)
+    check_placing(resolved.scenario, files.scenario)
+    _check_rule_sets(resolved.scenario, resolved.rule_sets, files.scenario, files.rule_sets)
+    _check_together(resolved, files)
+    return resolved
+
+
+def _load_arm(source: Source) -> ArmConfig:
+    arm = _decode(source, ArmConfig)
+    check_arm(arm, source.file)
+    return arm
+
+
+def _load_rig(source: Source) -> Rig:
+    rig = _decode(source, Rig)
+    check_rig(rig, source.file)
+    return rig
+
+
+def _load_learning(source: Source) -> LearningConfig:
+    learning = _decode(source, LearningConfig)
+    check_learning(learning, source.file)
+    return learning
+
+
+def _load_rules(source: Source) -> RuleSet:
+    rules = _decode(source, RuleSet)
+    check_rules(rules, source.file)
+    return rules
+
+
+def _load_wired(name: str | Path) -> tuple[Scenario, tuple[RuleSet, ...], str, tuple[str, ...]]:
+    source = read_source("scenarios", name)
+    scenario = _decode(source, Scenario)
+    check_scenario(scenario, source.file)
+    check_placing(scenario, source.file)
+    sources = [_rules_source(span.rules, i, source) for i, span in enumerate(scenario.schedule)]
+    rule_sets = tuple(_load_rules(rules_source) for rules_source in sources)
+    files = tuple(rules_source.file for rules_source in sources)
+    _check_rule_sets(scenario, rule_sets, source.file, files)
+    return scenario, rule_sets, source.file, files
+
+
+def _rules_source(name: str, i: int, scenario: Source) -> Source:
+    """Return a schedule's rule set; a name that leads nowhere is an error of the scenario's file."""
+    try:
+        return read_source("rules", name, base=scenario.folder)
+    except ConfigError as error:
+        raise ConfigError(
+            scenario.file, f"schedule[{i}].rules", error.expected, f"{error.got} ({error.file})"
+        ) from error
+
+
+def _check_rule_sets(
+    scenario: Scenario, rule_sets: tuple[RuleSet, ...], scenario_file: str, files: tuple[str, ...]
+) -> None:
+    for i, (rules, file) in enumerate(zip(rule_sets, files, strict=True)):
+        check_rules(rules, file)
+        check_wiring(scenario, rules, file)
+        check_reachable(scenario, rules, f"schedule[{i}].rules", scenario_file)
+
+
+def _check_together(resolved: Resolved, files: _Files) -> None:
+    """Check rig against arm, and scenario against arm."""
+    rig, arm = resolved.rig, resolved.arm
+    if rig.expected.model != arm.name:
+        raise ConfigError(
+            files.rig, "expected.model", f"{arm.name}, the model that the arm's file describes", rig.expected.model
+        )
+    n_ticks = arm.motion.step_s / rig.tick_s
+    if n_ticks < 0.5 or abs(n_ticks - round(n_ticks)) > WHOLE_TICKS:
+        raise ConfigError(
+            files.arm, "motion.step_s", f"whole ticks of the rig's {rig.tick_s:g} s", f"{arm.motion.step_s:g}"
+        )
+    check_fit(resolved.scenario, arm, files.scenario)
+
+
+def _decode(source: Source, kind: type[S]) -> S:
+    return decode(parse_yaml(source.text, source.file), kind, source.file)

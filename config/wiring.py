@@ -1,0 +1,53 @@
+"""Whether a rule set fits a scenario: its outputs, its inputs, and whether every goal can still be reached."""
+
+from config.decode import nearest
+from config.errors import ConfigError
+from config.reachable import GRIPPER_INPUT, unreachable_goals
+from config.rules import RuleSet
+from config.scenario import Scenario
+
+__all__ = ["check_reachable", "check_wiring"]
+
+
+def check_wiring(scenario: Scenario, rules: RuleSet, file: str) -> None:
+    """Check that a rule set switches each lid of the scenario once, by inputs that the scenario's cell has.
+
+    Args:
+        scenario: the table.
+        rules: one of the rule sets in its schedule.
+        file: what errors call the rule set's file.
+
+    Raises:
+        ConfigError: a name that the scenario does not have, or a lid without a rule.
+    """
+    lids = [box.name for box in scenario.boxes if box.lid is not None]
+    inputs = [button.name for button in scenario.buttons]
+    inputs += [box.name for box in scenario.boxes if box.presence_input is not None]
+    inputs.append(GRIPPER_INPUT)
+    for i, rule in enumerate(rules.rules):
+        _check_known(rule.output, lids, "a box with a lid", f"rules[{i}].output", scenario, file)
+        for k, literal in enumerate(rule.when):
+            what = "a button, a box with a sensor or the gripper"
+            _check_known(literal.input, inputs, what, f"rules[{i}].when[{k}].input", scenario, file)
+    ruled = {rule.output for rule in rules.rules}
+    for lid in lids:
+        if lid not in ruled:
+            raise ConfigError(file, "rules", f"a rule for each lid of scenario {scenario.name}", f"none for {lid}")
+
+
+def check_reachable(scenario: Scenario, rules: RuleSet, where: str, file: str) -> None:
+    """Check that every goal can be reached within an epoch under a rule set.
+
+    Raises:
+        ConfigError: at `where` in the scenario's `file`, naming the goals that cannot.
+    """
+    missing = unreachable_goals(scenario, rules)
+    if missing:
+        got = f"{rules.name}, under which {', '.join(missing)} cannot: what opens the lids in the way never holds"
+        raise ConfigError(file, where, "rules under which every goal can be reached", got)
+
+
+def _check_known(name: str, known: list[str], what: str, where: str, scenario: Scenario, file: str) -> None:
+    if name not in known:
+        expected = f"{what} of scenario {scenario.name}: {', '.join(known) or 'there is none'}"
+        raise ConfigError(file, where, expected, f"{name}{nearest(name, known)}")
