@@ -187,7 +187,7 @@ def _add_finger(palm: mujoco.MjsBody, arm: ArmConfig, name: str, side: float, ma
     y_inset = side * (thick - inset / 2)
     body.add_geom(
         name=f"pad_{name}", type=box, size=[wide / 2, thick / 2, tall / 2], pos=[0, y, tip_z - bumper - tall / 2],
-        condim=4, friction=[0.1, 0.005, 0.0001], solref=GRIP_SOLREF, solimp=GRIP_SOLIMP,
+        condim=4, friction=[0.1, 0.003, 0.0001], solref=GRIP_SOLREF, solimp=GRIP_SOLIMP,
         rgba=[0.13, 0.13, 0.14, 1], group=2, **common,
     )  # fmt: skip
     body.add_geom(

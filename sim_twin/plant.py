@@ -2,6 +2,7 @@
 
 import mujoco
 import numpy as np
+from numpy.typing import NDArray
 
 from config.arm import ArmConfig
 from config.rig import Rig
@@ -29,8 +30,10 @@ from sim_twin.table import TableDrive
 
 __all__ = ["TwinArm", "TwinClock", "TwinPlant", "TwinResetter", "TwinTruth"]
 
+Array = NDArray[np.float64]
 N_BITS = 16
 SETTLE_TICKS = 4
+STOP_RAD_S2 = 16.0  # deceleration of a stop; a CB3 UR5 at full speed stops its base in 0.31 rad, 244 ms
 HELD_GAP_M = 0.003
 STILL_M_S = 0.004
 
@@ -50,6 +53,7 @@ class TwinWorld:
         self.opening_goal_m = arm.tool.stroke_m
         self.grip_speed_m_s = arm.tool.speed_m_s[1]
         self.grip_control = self.model.actuator("grip").id
+        self.stop_speed_rad_s: Array | None = None
         self.joint_controls = np.array([self.model.actuator(j.name).id for j in arm.joints])
         self.finger_addresses = [int(self.model.joint(f"finger_{s}").qposadr[0]) for s in ("left", "right")]
 
@@ -58,9 +62,24 @@ class TwinWorld:
         step = self.grip_speed_m_s * self.tick_s
         self.opening_asked_m += min(max(self.opening_goal_m - self.opening_asked_m, -step), step)
         self.data.ctrl[self.grip_control] = self.opening_asked_m
+        if self.stop_speed_rad_s is not None:
+            self._ramp_down(self.stop_speed_rad_s)
         self.table.drive(self.data, self.digital_out)
         mujoco.mj_step(self.model, self.data, self.n_substeps)
         self.n_ticks += 1
+
+    def begin_stop(self) -> None:
+        """Let the set-points run out at a stop's deceleration from the speed that the joints have now."""
+        if self.stop_speed_rad_s is None:
+            self.stop_speed_rad_s = self.data.qvel[:6].copy()
+            self.data.ctrl[self.joint_controls] = self.data.qpos[:6]
+
+    def _ramp_down(self, speed: Array) -> None:
+        # One share for all joints, so that the tool stays on its path while it slows down.
+        fastest = float(np.abs(speed).max())
+        share = max(0.0, 1.0 - STOP_RAD_S2 * self.tick_s / fastest) if fastest > 0.0 else 0.0
+        speed *= share
+        self.data.ctrl[self.joint_controls] += speed * self.tick_s
 
     @property
     def now_ns(self) -> int:
@@ -71,6 +90,7 @@ class TwinWorld:
         """Place everything (a reset): the only teleport there is."""
         model, data, tool = self.model, self.data, self.arm.tool
         mujoco.mj_resetData(model, data)
+        self.stop_speed_rad_s = None
         for name, (x, y) in layout.fixtures_m.items():
             model.body(name).pos[:2] = (x, y)
         for cylinder in self.scenario.cylinders:
@@ -184,6 +204,7 @@ class TwinArm:
         if not self._is_connected:
             raise NotEngagedError("twin arm: expected connect() before write(); nothing moved")
         world = self._world
+        world.stop_speed_rad_s = None
         world.data.ctrl[world.joint_controls] = command.q_rad
         grip = command.grip
         world.opening_goal_m = grip.opening_m
@@ -194,7 +215,7 @@ class TwinArm:
     def stop(self) -> bool:
         """Hold where the arm is; the hand keeps its force."""
         world = self._world
-        world.data.ctrl[world.joint_controls] = self._q
+        world.begin_stop()
         return True
 
     def close(self) -> None:
