@@ -14,7 +14,20 @@ from numpy.typing import NDArray
 from config.arm import ArmConfig, Joint
 from robot.appearance import dress_arm, dress_tool
 
-__all__ = ["ARM_CONTACT", "FIXTURE_CONTACT", "GRIP_SOLIMP", "GRIP_SOLREF", "OBJECT_CONTACT", "arm_model", "arm_spec", "dh_constant", "forward_kinematics", "tool_down", "tool_transform", "write_mjcf"]
+__all__ = [
+    "ARM_CONTACT",
+    "FIXTURE_CONTACT",
+    "GRIP_SOLIMP",
+    "GRIP_SOLREF",
+    "OBJECT_CONTACT",
+    "arm_model",
+    "arm_spec",
+    "dh_constant",
+    "forward_kinematics",
+    "tool_down",
+    "tool_transform",
+    "write_mjcf",
+]
 
 Array = NDArray[np.float64]
 
@@ -58,8 +71,8 @@ def forward_kinematics(arm: ArmConfig, q_rad: tuple[float, ...] | Array, *, fram
     T = np.eye(4)
     for joint, q in zip(arm.joints, q_rad, strict=True):
         c, s = np.cos(q), np.sin(q)
-        Rz = np.array([[c, -s, 0.0, 0.0], [s, c, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]])
-        T = T @ Rz @ dh_constant(joint)
+        R_z = np.array([[c, -s, 0.0, 0.0], [s, c, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]])
+        T = T @ R_z @ dh_constant(joint)
     return T @ tool_transform(arm) if frame == "tcp" else T
 
 

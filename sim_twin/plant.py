@@ -1,5 +1,7 @@
 """The twin: the Plant door in front of MuJoCo, in lock-step."""
 
+from collections.abc import Iterable
+
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
@@ -7,7 +9,7 @@ from numpy.typing import NDArray
 from config.arm import ArmConfig
 from config.rig import Rig
 from config.scenario import Scenario
-from robot.description import forward_kinematics
+from robot.clock import LockStepClock
 from robot.errors import NotEngagedError, StaleStateError
 from robot.hal.protocols import Camera
 from robot.kinematics import Kinematics
@@ -23,12 +25,13 @@ from robot.messages import (
     Quat,
     SceneState,
     Vec3,
+    Vec6,
 )
 from sim_twin.layout import Layout, draw_layout
 from sim_twin.scene import build_scene
 from sim_twin.table import TableDrive
 
-__all__ = ["TwinArm", "TwinClock", "TwinPlant", "TwinResetter", "TwinTruth"]
+__all__ = ["TwinArm", "TwinPlant", "TwinResetter", "TwinTruth", "TwinWorld"]
 
 Array = NDArray[np.float64]
 N_BITS = 16
@@ -47,7 +50,7 @@ class TwinWorld:
         self.data = mujoco.MjData(self.model)
         self.table = TableDrive(self.model, scenario, tick_s=rig.tick_s)
         self.n_substeps = round(rig.tick_s / rig.physics_s)
-        self.n_ticks = 0
+        self.clock = LockStepClock(tick_s=rig.tick_s, advance=self.advance)
         self.digital_out = 0
         self.opening_asked_m = arm.tool.stroke_m
         self.opening_goal_m = arm.tool.stroke_m
@@ -66,7 +69,6 @@ class TwinWorld:
             self._ramp_down(self.stop_speed_rad_s)
         self.table.drive(self.data, self.digital_out)
         mujoco.mj_step(self.model, self.data, self.n_substeps)
-        self.n_ticks += 1
 
     def begin_stop(self) -> None:
         """Let the set-points run out at a stop's deceleration from the speed that the joints have now."""
@@ -80,11 +82,6 @@ class TwinWorld:
         share = max(0.0, 1.0 - STOP_RAD_S2 * self.tick_s / fastest) if fastest > 0.0 else 0.0
         speed *= share
         self.data.ctrl[self.joint_controls] += speed * self.tick_s
-
-    @property
-    def now_ns(self) -> int:
-        """Time since the world was made; runs on through resets."""
-        return round(self.n_ticks * self.tick_s * 1e9)
 
     def put(self, layout: Layout, q_rad: tuple[float, ...], digital_out: int) -> None:
         """Place everything (a reset): the only teleport there is."""
@@ -119,37 +116,21 @@ def _fill_history(model: mujoco.MjModel, data: mujoco.MjData) -> None:
             mujoco.mj_initCtrlHistory(model, data, i, times, np.full(n, data.ctrl[i]))
 
 
-class TwinClock:
-    """Lock-step: waiting for the next tick advances physics by one tick and never misses one."""
-
-    def __init__(self, world: TwinWorld) -> None:
-        self._world = world
-
-    def now_ns(self) -> int:
-        """Return simulated time in nanoseconds."""
-        return self._world.now_ns
-
-    def wait_tick(self) -> int:
-        """Advance one tick; return 0 missed."""
-        self._world.advance()
-        return 0
-
-
 class TwinArm:
     """The arm, its hand and its inputs and outputs on the twin."""
 
     def __init__(self, world: TwinWorld) -> None:
         self._world = world
-        self.clock = TwinClock(world)
+        self.clock = world.clock
         joints = world.arm.joints
         self.spec = ArmSpec(
             model=world.arm.name,
             rate_hz=1.0 / world.tick_s,
             n_inputs=N_BITS,
             n_outputs=N_BITS,
-            q_min_rad=tuple(j.range_rad[0] for j in joints),
-            q_max_rad=tuple(j.range_rad[1] for j in joints),
-            qd_max_rad_s=tuple(j.speed_rad_s for j in joints),
+            q_min_rad=_vec6(j.range_rad[0] for j in joints),
+            q_max_rad=_vec6(j.range_rad[1] for j in joints),
+            qd_max_rad_s=_vec6(j.speed_rad_s for j in joints),
             grip_stroke_m=world.arm.tool.stroke_m,
         )
         self._is_connected = False
@@ -160,9 +141,7 @@ class TwinArm:
         sensor = model.sensor("tool_force")
         self._force = data.sensordata[sensor.adr[0] : sensor.adr[0] + 3]
         self._fingers = [data.qpos[a : a + 1] for a in world.finger_addresses]
-        self._finger_speeds = [
-            data.qvel[int(model.joint(f"finger_{s}").dofadr[0]) :][:1] for s in ("left", "right")
-        ]
+        self._finger_speeds = [data.qvel[int(model.joint(f"finger_{s}").dofadr[0]) :][:1] for s in ("left", "right")]
         self._has_object = False
 
     def connect(self) -> None:
@@ -176,12 +155,12 @@ class TwinArm:
         world = self._world
         fx, fy, fz = self._force.tolist()
         return ArmState(
-            stamp_ns=world.now_ns,
-            q_rad=tuple(self._q.tolist()),
-            qd_rad_s=tuple(self._qd.tolist()),
-            tcp_position_m=tuple(self._tcp.tolist()),
-            tcp_quat=tuple(self._tcp_body.tolist()),
-            tcp_force_n=(-fx, -fy, -fz),
+            stamp_ns=world.clock.now_ns(),
+            q_rad=_vec6(self._q.tolist()),
+            qd_rad_s=_vec6(self._qd.tolist()),
+            tcp_position_m=_vec3(self._tcp),
+            tcp_quat=_quat(self._tcp_body),
+            tcp_force_n=(0.0 - fx, 0.0 - fy, 0.0 - fz),
             grip=self._read_grip(),
             digital_in=world.table.read_inputs(world.data),
             digital_out=world.digital_out,
@@ -238,7 +217,7 @@ class TwinTruth:
         """Return poses in the scenario's order: buttons (their caps), boxes (centre of the floor), cylinders."""
         data = self._world.data
         return SceneState(
-            stamp_ns=self._world.now_ns,
+            stamp_ns=self._world.clock.now_ns(),
             objects=tuple(
                 ObjectPose(
                     name=name,
@@ -263,7 +242,7 @@ class TwinResetter:
         q_rad = self._kinematics.solve(layout.start_m, world.arm.home_rad)
         world.put(layout, q_rad, digital_out)
         for _ in range(SETTLE_TICKS):
-            world.advance()
+            world.clock.wait_tick()
 
 
 class TwinPlant:
@@ -276,14 +255,17 @@ class TwinPlant:
         self.cameras: dict[str, Camera] = {}
         self.truth = TwinTruth(self._world)
         self.resetter = TwinResetter(self._world, Kinematics(arm))
-        self._world.put(
-            draw_layout(scenario, np.random.default_rng(0)), arm.home_rad, digital_out=0
-        )
+        self._world.put(draw_layout(scenario, np.random.default_rng(0)), arm.home_rad, digital_out=0)
 
     @property
     def world(self) -> TwinWorld:
         """Model and data, for pictures and benches."""
         return self._world
+
+
+def _vec6(values: Iterable[float]) -> Vec6:
+    a, b, c, d, e, f = values
+    return a, b, c, d, e, f
 
 
 def _vec3(array: np.ndarray) -> Vec3:

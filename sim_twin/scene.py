@@ -5,17 +5,19 @@ actuators and locked by a joint equality only when shut, cylinders are free bodi
 """
 
 import mujoco
+import numpy as np
 
 from config.arm import ArmConfig
 from config.scenario import Box, Button, Cylinder, Scenario
+from config.values import Point
 from robot.description import FIXTURE_CONTACT, GRIP_SOLIMP, GRIP_SOLREF, OBJECT_CONTACT, arm_spec
 from robot.servo import lag_s
 
 __all__ = ["LEAF_THICKNESS_M", "build_scene", "leaf_names"]
 
 LEAF_THICKNESS_M = 0.005
-# Nm/rad. Droop stays under 0.5 mm with the tool's weight compensated; a servo four times as stiff makes a carried object
-# creep 2 mm, because implicitfast changes the velocity step after the contacts were solved.
+# Nm/rad. Droop stays under 0.5 mm with the tool's weight compensated; a servo four times as stiff makes a carried
+# object creep 2 mm, because implicitfast changes the velocity step after the contacts were solved.
 SERVO_STIFFNESS = (5_000.0, 5_000.0, 5_000.0, 1_000.0, 1_000.0, 1_000.0)
 FINGER_STIFFNESS = 6_000.0  # N/m
 _BOX = mujoco.mjtGeom.mjGEOM_BOX
@@ -88,9 +90,18 @@ def _add_surroundings(spec: mujoco.MjSpec, scenario: Scenario) -> None:
     )  # fmt: skip
     world.add_geom(
         type=mujoco.mjtGeom.mjGEOM_PLANE, pos=[0, 0, table.height_m - 0.75], size=[4, 4, 0.1],
-        rgba=[0.60, 0.61, 0.62, 1], **_LOOK,
+        rgba=[0.70, 0.71, 0.72, 1], **_LOOK,
     )  # fmt: skip
-    world.add_camera(name="overview", pos=[1.45, -1.0, 0.95], xyaxes=[0.62, 0.785, 0, -0.42, 0.33, 0.845], fovy=40)
+    _add_camera(world, eye=(1.62, -1.12, 1.12), target=(0.30, -0.02, 0.20))
+
+
+def _add_camera(world: mujoco.MjsBody, *, eye: Point, target: Point) -> None:
+    """The overview: looks from eye to target, base frame, up is up."""
+    back = np.subtract(eye, target)
+    right = np.cross([0.0, 0.0, 1.0], back)
+    up = np.cross(back, right)
+    axes = np.concatenate([right / np.linalg.norm(right), up / np.linalg.norm(up)])
+    world.add_camera(name="overview", pos=eye, xyaxes=axes, fovy=36)
 
 
 def _add_button(spec: mujoco.MjSpec, button: Button, table_m: float) -> None:

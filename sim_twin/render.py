@@ -1,0 +1,62 @@
+"""Pictures of the twin: off-screen rendering with lit lamps, where a GL can be had."""
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from sim_twin.plant import TwinWorld
+
+__all__ = ["NoGLError", "Picture", "open_renderer", "render"]
+
+Picture = NDArray[np.uint8]
+BACKENDS = ("egl", "osmesa")
+GLOW = 0.55
+
+
+class NoGLError(RuntimeError):
+    """No way to draw off-screen on this machine."""
+
+
+@contextmanager
+def open_renderer(world: TwinWorld, *, width: int = 1280, height: int = 960) -> Iterator[mujoco.Renderer]:
+    """Give an off-screen renderer of a world.
+
+    Raises:
+        NoGLError: neither EGL nor OSMesa works here; the message says what to install.
+    """
+    try:
+        renderer = mujoco.Renderer(world.model, height, width)
+    except (ImportError, AttributeError, RuntimeError, mujoco.FatalError) as error:
+        backend = os.environ.get("MUJOCO_GL", "unset")
+        raise NoGLError(
+            f"expected an off-screen GL, MUJOCO_GL is {backend}, it said: {error}. Set MUJOCO_GL=egl (Debian: apt "
+            "install libegl1 libgl1-mesa-dri) or MUJOCO_GL=osmesa (apt install libosmesa6) before the program starts."
+        ) from error
+    try:
+        yield renderer
+    finally:
+        renderer.close()
+
+
+def render(world: TwinWorld, renderer: mujoco.Renderer, *, camera: str = "overview") -> Picture:
+    """Draw the world as it stands, lamps lit as the outputs say.  -> (height, width, 3) uint8"""
+    light_lamps(world)
+    option = mujoco.MjvOption()
+    option.sitegroup[:] = 0
+    option.geomgroup[:] = (1, 1, 1, 0, 0, 0)
+    renderer.update_scene(world.data, camera, option)
+    return renderer.render()
+
+
+def light_lamps(world: TwinWorld) -> None:
+    """Colour each dome bright where its lamp is lit, dull where it is not. Looks only."""
+    for button in world.scenario.buttons:
+        is_lit = bool(world.digital_out >> button.lamp_output & 1)
+        colour = np.asarray(button.colour)
+        shown = colour + (1.0 - colour) * GLOW if is_lit else colour * 0.8
+        world.model.geom(f"{button.name}_dome").rgba[:3] = shown
+        world.model.geom(f"{button.name}_cap").rgba[:3] = shown * 0.9
