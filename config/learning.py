@@ -66,6 +66,10 @@ class SubgoalSelection(Section, frozen=True, kw_only=True):
     """Chance that a goal is achieved although its preconditions do not hold."""
     blocked_error: Share = 0.05
     """Least chance that a trial counts as blocked although nothing was missing."""
+    curiosity: Share = 0.0
+    """Chance per trial that a doubtful precondition is tried out before the plan is followed."""
+    least_doubt: Share = 0.1
+    """Least chance of being wrong that makes a precondition doubtful enough for that."""
     use_blocked_only: bool = True
     """Only trials that reached the place but were blocked are evidence against."""
 
