@@ -86,8 +86,8 @@ class Cylinder(Section, frozen=True, kw_only=True):
     colour: Colour
     diameter_m: Annotated[float, Meta(ge=0.01, le=0.08)] = 0.044
     height_m: Span = 0.06
-    mass_kg: Mass = 0.12
-    friction: Annotated[float, Meta(gt=0.0, le=3.0)] = 1.0
+    mass_kg: Mass = 0.5
+    friction: Annotated[float, Meta(gt=0.0, le=3.0)] = 0.5
     receptacle: Name | None = None
     """Box that the hand opens over when it holds this."""
     is_distractor: bool = False

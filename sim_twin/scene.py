@@ -59,6 +59,7 @@ def _set_options(spec: mujoco.MjSpec, physics_s: float) -> None:
     option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
     option.impratio = 10.0
     option.jacobian = mujoco.mjtJacobian.mjJAC_DENSE
+    option.enableflags |= int(mujoco.mjtEnableBit.mjENBL_SLEEP)  # what lies still costs nothing
     option.tolerance = 1e-7
     option.iterations = 30
 
@@ -77,7 +78,7 @@ def _add_surroundings(spec: mujoco.MjSpec, scenario: Scenario) -> None:
     x, y = table.centre_m
     world.add_geom(
         name="table", type=mujoco.mjtGeom.mjGEOM_PLANE, pos=[x, y, table.height_m], size=[2, 2, 0.1], group=3,
-        rgba=[0, 0, 0, 0], condim=4, friction=[0.8, 0.01, 0.0001], **_FIXTURE,
+        rgba=[0, 0, 0, 0], condim=3, friction=[0.8, 0.01, 0.0001], **_FIXTURE,
     )  # fmt: skip
     half = [table.size_m[0] / 2, table.size_m[1] / 2, 0.02]
     world.add_geom(type=_BOX, pos=[x, y, table.height_m - 0.0205], size=half, rgba=[*table.colour, 1], **_LOOK)
@@ -146,7 +147,7 @@ def _add_box(spec: mujoco.MjSpec, box: Box, table_m: float) -> None:
     for name, sign in zip(leaf_names(box), (-1, 1), strict=True):
         hinge = body.add_body(name=name, pos=[sign * leaf, 0, h + LEAF_THICKNESS_M / 2])
         hinge.add_joint(
-            name=name, type=mujoco.mjtJoint.mjJNT_HINGE, axis=[0, sign, 0], range=[0, box.lid.open_angle_rad + 0.05],
+            name=name, type=mujoco.mjtJoint.mjJNT_HINGE, axis=[0, sign, 0], range=[-0.02, box.lid.open_angle_rad + 0.05],
             limited=mujoco.mjtLimited.mjLIMITED_TRUE, damping=0.02, armature=0.0005,
         )  # fmt: skip
         hinge.add_geom(
@@ -172,7 +173,7 @@ def _add_cylinder(spec: mujoco.MjSpec, cylinder: Cylinder) -> None:
     contype, conaffinity = OBJECT_CONTACT
     body.add_geom(
         name=cylinder.name, type=_CYLINDER, size=[cylinder.diameter_m / 2, cylinder.height_m / 2, 0],
-        mass=cylinder.mass_kg, friction=[cylinder.friction, 0.005, 0.0001], condim=4, rgba=[*cylinder.colour, 1],
+        mass=cylinder.mass_kg, friction=[cylinder.friction, 0.005, 0.0001], condim=3, rgba=[*cylinder.colour, 1],
         solref=GRIP_SOLREF, solimp=GRIP_SOLIMP, contype=contype, conaffinity=conaffinity,
     )  # fmt: skip
 
