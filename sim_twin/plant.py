@@ -46,7 +46,7 @@ class TwinWorld:
 
     def __init__(self, arm: ArmConfig, scenario: Scenario, rig: Rig) -> None:
         self.arm, self.scenario, self.tick_s = arm, scenario, rig.tick_s
-        self.model = build_scene(arm, scenario, physics_s=rig.physics_s).compile()
+        self.model = build_scene(arm, scenario, physics_s=rig.physics_s, tick_s=rig.tick_s).compile()
         self.data = mujoco.MjData(self.model)
         self.table = TableDrive(self.model, scenario, tick_s=rig.tick_s)
         self.n_substeps = round(rig.tick_s / rig.physics_s)

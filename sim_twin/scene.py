@@ -16,9 +16,9 @@ from robot.servo import lag_s
 __all__ = ["LEAF_THICKNESS_M", "build_scene", "leaf_names"]
 
 LEAF_THICKNESS_M = 0.005
-# Nm/rad. Droop stays under 0.5 mm with the tool's weight compensated; a servo four times as stiff makes a carried
+# Nm/rad. Droop stays under 0.5 mm with the tool's weight compensated; a servo three times as stiff makes a carried
 # object creep 2 mm, because implicitfast changes the velocity step after the contacts were solved.
-SERVO_STIFFNESS = (5_000.0, 5_000.0, 5_000.0, 1_000.0, 1_000.0, 1_000.0)
+SERVO_STIFFNESS = (8_000.0, 8_000.0, 8_000.0, 1_600.0, 1_600.0, 1_600.0)
 FINGER_STIFFNESS = 6_000.0  # N/m
 _BOX = mujoco.mjtGeom.mjGEOM_BOX
 _CYLINDER = mujoco.mjtGeom.mjGEOM_CYLINDER
@@ -26,7 +26,7 @@ _FIXTURE = {"contype": FIXTURE_CONTACT[0], "conaffinity": FIXTURE_CONTACT[1]}
 _LOOK = {"contype": 0, "conaffinity": 0, "mass": 0, "group": 1}
 
 
-def build_scene(arm: ArmConfig, scenario: Scenario, *, physics_s: float) -> mujoco.MjSpec:
+def build_scene(arm: ArmConfig, scenario: Scenario, *, physics_s: float, tick_s: float) -> mujoco.MjSpec:
     """Return the whole world: arm, gripper, table, buttons, boxes, lids, cylinders, actuators and sensors."""
     spec = arm_spec(arm)
     spec.modelname = f"{arm.name}_{scenario.name}"
@@ -38,7 +38,7 @@ def build_scene(arm: ArmConfig, scenario: Scenario, *, physics_s: float) -> mujo
         _add_box(spec, box, scenario.table.height_m)
     for cylinder in scenario.cylinders:
         _add_cylinder(spec, cylinder)
-    _add_servos(spec, arm, physics_s)
+    _add_servos(spec, arm, physics_s, tick_s)
     _add_grip(spec, arm)
     spec.add_sensor(
         name="tool_force", type=mujoco.mjtSensor.mjSENS_CONTACT, objtype=mujoco.mjtObj.mjOBJ_XBODY, objname="tool",
@@ -178,10 +178,15 @@ def _add_cylinder(spec: mujoco.MjSpec, cylinder: Cylinder) -> None:
     )  # fmt: skip
 
 
-def _add_servos(spec: mujoco.MjSpec, arm: ArmConfig, physics_s: float) -> None:
-    """Position servos whose ramp lag kd / kp plus dead time follows robot.servo.lag_s; torque limits from the file."""
+def _add_servos(spec: mujoco.MjSpec, arm: ArmConfig, physics_s: float, tick_s: float) -> None:
+    """Position servos; torque limits from the file.
+
+    A ramp is trailed by kd / kp, plus the dead time, plus half a tick because set-points come in steps: kd is chosen so
+    that the sum is robot.servo.lag_s.
+    """
     servo = arm.servo
-    lag = lag_s(lookahead_s=servo.lookahead_s, gain=servo.gain, dead_time_s=servo.dead_time_s) - servo.dead_time_s
+    lag = lag_s(lookahead_s=servo.lookahead_s, gain=servo.gain, dead_time_s=servo.dead_time_s)
+    lag -= servo.dead_time_s + tick_s / 2
     n_delay = round(servo.dead_time_s / physics_s)
     for joint, kp in zip(arm.joints, SERVO_STIFFNESS, strict=True):
         actuator = spec.add_actuator(
