@@ -86,7 +86,7 @@ class Cylinder(Section, frozen=True, kw_only=True):
     colour: Colour
     diameter_m: Annotated[float, Meta(ge=0.01, le=0.08)] = 0.044
     height_m: Span = 0.06
-    mass_kg: Mass = 0.5
+    mass_kg: Mass = 0.45
     friction: Annotated[float, Meta(gt=0.0, le=3.0)] = 0.5
     receptacle: Name | None = None
     """Box that the hand opens over when it holds this."""

@@ -18,7 +18,7 @@ __all__ = ["LEAF_THICKNESS_M", "build_scene", "leaf_names"]
 LEAF_THICKNESS_M = 0.005
 # Nm/rad. Droop stays under 0.5 mm with the tool's weight compensated; a servo three times as stiff makes a carried
 # object creep 2 mm, because implicitfast changes the velocity step after the contacts were solved.
-SERVO_STIFFNESS = (8_000.0, 8_000.0, 8_000.0, 1_600.0, 1_600.0, 1_600.0)
+SERVO_STIFFNESS = (6_000.0, 6_000.0, 6_000.0, 1_200.0, 1_200.0, 1_200.0)
 FINGER_STIFFNESS = 6_000.0  # N/m
 _BOX = mujoco.mjtGeom.mjGEOM_BOX
 _CYLINDER = mujoco.mjtGeom.mjGEOM_CYLINDER
