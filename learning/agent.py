@@ -4,6 +4,7 @@ Read it as the paper tells it: the goal selector chooses at each epoch, the sub-
 sub-goal's expert at each time step. What was achieved in an epoch stays achieved (latched) until the next reset.
 """
 
+from collections.abc import Iterable
 from typing import Any, Protocol
 
 import msgspec
@@ -34,6 +35,10 @@ class GoalSelector(Protocol):
 
     def end_epoch(self, goal: int, *, predicted: float, is_achieved: bool) -> None:
         """Learn from one epoch; predicted is the chance of its goal said at the epoch's start."""
+        ...
+
+    def rearm(self, goals: Iterable[int]) -> None:
+        """Take up goals again whose believed needs have changed."""
         ...
 
     def state_dict(self) -> dict[str, Any]:
@@ -129,10 +134,14 @@ class Agent:
         """How many goals there are."""
         return self.judge.n_goals
 
-    def learn_epoch(self, station: Station, *, epoch: int, seed: int) -> EpochRecord:
-        """Choose a goal, lay the table out and pursue it for up to eight trials, learning."""
+    def choose_goal(self) -> int:
+        """Return the goal of the next epoch."""
         goal = self.goal_selector.select()
         self._stopwatch.lap("selectors")
+        return goal
+
+    def learn_epoch(self, station: Station, *, epoch: int, seed: int, goal: int) -> EpochRecord:
+        """Lay the table out and pursue a goal for up to eight trials, learning."""
         scene = self._reset(station, epoch=epoch, seed=seed)
         predicted = self.experts.utility(goal, scene.percept)
         record = self._run_epoch(station, scene, epoch=epoch, goal=goal, explore=True)
@@ -175,19 +184,23 @@ class Agent:
             if record.attempt.outcome is TrialOutcome.VOID:
                 break
             if explore:
-                self.goal_selector.update(record.attempt)
-                self.subgoal_selector.update(record.attempt)
-                self._stopwatch.lap("selectors")
+                self._learn(record.attempt)
         is_void = bool(records) and records[-1].attempt.outcome is TrialOutcome.VOID
         is_achieved = scene.latched[goal] and not is_void
         return EpochRecord(epoch=epoch, goal=goal, is_achieved=is_achieved, is_void=is_void, trials=tuple(records))
+
+    def _learn(self, attempt: Attempt) -> None:
+        self.goal_selector.update(attempt)
+        self.subgoal_selector.update(attempt)
+        self.goal_selector.rearm(self.subgoal_selector.changed_goals())
+        self._stopwatch.lap("selectors")
 
     # ------------------------------------------------------------------------------------------------------- trial
 
     def _run_trial(
         self, station: Station, scene: _Scene, *, epoch: int, goal: int, trial: int, explore: bool
     ) -> TrialRecord:
-        state = scene.latched
+        state, holds = scene.latched, scene.holding
         temperature = self.goal_selector.temperature(goal)
         subgoal = self.subgoal_selector.select(
             goal=goal, state=state, available=scene.available(), temperature=temperature, explore=explore
@@ -205,6 +218,8 @@ class Agent:
             subgoal=subgoal,
             state=state,
             state_after=scene.latched,
+            holds=holds,
+            holds_after=scene.holding,
             outcome=outcome,
             predicted=predicted,
             skill=skill,

@@ -13,6 +13,9 @@ from robot.station import Station
 
 __all__ = ["GoalScore", "GoalTest", "Learner", "evaluation_row", "learnt_graph", "run_test"]
 
+HALF = 0.5
+"""A goal is predicted to be allowed where that is more probable than not."""
+
 
 class Learner(Protocol):
     """An agent and the station it acts through; whoever makes one also closes it."""
@@ -93,4 +96,7 @@ def evaluation_row(test: GoalTest, score: GoalScore, graph: tuple[int, int] | No
 
 def learnt_graph(agent: Agent) -> Callable[[int, GoalState], bool] | None:
     """Return the agent's own word on whether a goal can come about in a goal-state, None if it learns no graph."""
-    return getattr(agent.subgoal_selector, "predict_allowed", None)
+    probability = getattr(agent.subgoal_selector, "predict_allowed", None)
+    if probability is None:
+        return None
+    return lambda goal, state: probability(goal, state) > HALF

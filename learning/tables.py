@@ -1,4 +1,4 @@
-"""Tables on disk that grow row by row and can be cut back to where a checkpoint knew them."""
+"""Tables on disk that grow row by row and can be cut back to the rows that a checkpoint knew."""
 
 import os
 from collections.abc import Iterable
@@ -16,36 +16,36 @@ TABLES: dict[str, type[Row]] = {"trials": TrialRow, "goals": GoalRow, "evaluatio
 
 
 class Tables:
-    """The open tables of one run. Byte offsets tell a checkpoint how far they reached."""
+    """The open tables of one run. Row counts tell a checkpoint how far they reached."""
 
-    def __init__(self, folder: Path, *, offsets: dict[str, int] | None = None) -> None:
+    def __init__(self, folder: Path, *, n_rows: dict[str, int] | None = None) -> None:
         """Open the tables.
 
         Args:
             folder: the run folder.
-            offsets: where to cut each table back to; None starts them anew.
+            n_rows: how many rows of each table to keep, what follows is cut off; None starts all anew.
 
         Raises:
-            RunFolderError: a table is shorter than the checkpoint knew it.
+            RunFolderError: a table has fewer rows than are to be kept.
         """
-        if offsets is not None:
-            for name in TABLES:
-                _cut(folder / f"{name}.csv", offsets[name])
-        mode = "wb" if offsets is None else "ab"
-        self._files = {name: (folder / f"{name}.csv").open(mode) for name in TABLES}
-        self._offsets = dict.fromkeys(TABLES, 0) if offsets is None else {name: offsets[name] for name in TABLES}
-        if offsets is None:
-            for name, row_type in TABLES.items():
-                self._write(name, header(row_type) + "\n")
-            self.flush()
+        self._n_rows = dict.fromkeys(TABLES, 0) if n_rows is None else {name: n_rows[name] for name in TABLES}
+        for name, row_type in TABLES.items():
+            path = folder / f"{name}.csv"
+            if n_rows is None:
+                path.write_text(header(row_type) + "\n", encoding="utf-8")
+            else:
+                _cut(path, n_rows[name])
+        self._files = {name: (folder / f"{name}.csv").open("ab") for name in TABLES}
 
     def append(self, name: str, rows: Iterable[Row]) -> None:
         """Add rows to a table."""
-        self._write(name, "".join(cells(row) + "\n" for row in rows))
+        lines = [cells(row) + "\n" for row in rows]
+        self._files[name].write("".join(lines).encode())
+        self._n_rows[name] += len(lines)
 
-    def offset(self, name: str) -> int:
-        """How many bytes a table has."""
-        return self._offsets[name]
+    def n_rows(self, name: str) -> int:
+        """How many rows a table has."""
+        return self._n_rows[name]
 
     def flush(self) -> None:
         """Let other programs see every row."""
@@ -69,15 +69,12 @@ class Tables:
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
         self.close()
 
-    def _write(self, name: str, text: str) -> None:
-        self._offsets[name] += self._files[name].write(text.encode())
 
-
-def _cut(path: Path, offset: int) -> None:
-    n_bytes = path.stat().st_size if path.exists() else 0
-    if n_bytes < offset:
-        raise RunFolderError(
-            f"{path}: expected at least the {offset} bytes that the checkpoint counts on, got {n_bytes}"
-        )
+def _cut(path: Path, n_rows: int) -> None:
+    """Cut a table after so many rows."""
+    lines = path.read_bytes().splitlines(keepends=True) if path.exists() else []
+    n_whole = sum(line.endswith(b"\n") for line in lines) - 1
+    if n_whole < n_rows:
+        raise RunFolderError(f"{path}: expected the {n_rows} rows that the checkpoint counts on, got {max(0, n_whole)}")
     with path.open("r+b") as file:
-        file.truncate(offset)
+        file.truncate(sum(len(line) for line in lines[: n_rows + 1]))

@@ -84,7 +84,7 @@ def agent_for(goal, subgoals, *, experts=None, judge=None, **protocol):
 
 
 def learn(agent, allowed=free, **station):
-    return agent.learn_epoch(ToyStation(allowed, **station), epoch=5, seed=3)
+    return agent.learn_epoch(ToyStation(allowed, **station), epoch=5, seed=3, goal=agent.choose_goal())
 
 
 def outcomes(record):
@@ -167,10 +167,10 @@ def test_a_void_trial_ends_the_epoch_and_teaches_nothing():
     learner = make_toy_learner(0, Experiment(), void_epochs=(5,))
     agent = learner.agent
     for epoch in range(5):
-        agent.learn_epoch(learner.station, epoch=epoch, seed=epoch)
+        agent.learn_epoch(learner.station, epoch=epoch, seed=epoch, goal=agent.choose_goal())
     before = agent.state_dict()
     n_attempts = len(agent.goal_selector.attempts)
-    record = agent.learn_epoch(learner.station, epoch=5, seed=5)
+    record = agent.learn_epoch(learner.station, epoch=5, seed=5, goal=agent.choose_goal())
     after = agent.state_dict()
     assert record.is_void
     assert not record.is_achieved
@@ -198,8 +198,9 @@ def test_prediction_and_skill_are_said_before_the_trial():
 
 def test_a_test_epoch_changes_nothing_learnt_and_draws_nothing():
     learner = make_toy_learner(1, Experiment())
+    agent = learner.agent
     for epoch in range(20):
-        learner.agent.learn_epoch(learner.station, epoch=epoch, seed=epoch)
+        agent.learn_epoch(learner.station, epoch=epoch, seed=epoch, goal=agent.choose_goal())
     before = encode(learner.agent.state_dict())
     records = [learner.agent.test_epoch(learner.station, epoch=3, seed=9, goal=goal) for goal in range(N_GOALS)]
     assert encode(learner.agent.state_dict()) == before

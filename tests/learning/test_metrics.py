@@ -190,23 +190,29 @@ def test_what_is_no_such_table_is_refused(tmp_path, text):
         read_rows(tmp_path / "absent.csv", GoalRow)
 
 
-def test_tables_are_cut_back_to_a_checkpoints_offsets_and_go_on_from_there(tmp_path):
+def test_tables_are_cut_back_to_the_rows_a_checkpoint_knew_and_go_on_from_there(tmp_path):
     with Tables(tmp_path) as tables:
         tables.append("trials", [trial_row(0)])
-        offsets = {name: tables.offset(name) for name in ("trials", "goals", "evaluations")}
+        n_rows = {name: tables.n_rows(name) for name in ("trials", "goals", "evaluations")}
         tables.append("trials", [trial_row(1), trial_row(2)])
     whole = (tmp_path / "trials.csv").read_bytes()
-    with Tables(tmp_path, offsets=offsets) as tables:
+    (tmp_path / "trials.csv").write_bytes(whole + b"torn,li")
+    with Tables(tmp_path, n_rows=n_rows) as tables:
         tables.append("trials", [trial_row(1), trial_row(2)])
-        assert tables.offset("trials") == len(whole)
+        assert tables.n_rows("trials") == 3
     assert (tmp_path / "trials.csv").read_bytes() == whole
 
 
-def test_a_table_shorter_than_its_checkpoint_knows_is_refused(tmp_path):
+def test_a_table_with_fewer_rows_than_its_checkpoint_knew_is_refused(tmp_path):
     with Tables(tmp_path) as tables:
-        offsets = {name: tables.offset(name) for name in ("trials", "goals", "evaluations")}
-    with pytest.raises(RunFolderError, match="at least"):
-        Tables(tmp_path, offsets={**offsets, "goals": 10_000})
+        tables.append("goals", [choice(0), choice(1)])
+    torn = (tmp_path / "goals.csv").read_bytes()[:-1]
+    (tmp_path / "goals.csv").write_bytes(torn)
+    with pytest.raises(RunFolderError, match=r"goals\.csv: expected the 2 rows .* got 1"):
+        Tables(tmp_path, n_rows={"trials": 0, "goals": 2, "evaluations": 0})
+    (tmp_path / "goals.csv").unlink()
+    with pytest.raises(RunFolderError, match="got 0"):
+        Tables(tmp_path, n_rows={"trials": 0, "goals": 2, "evaluations": 0})
 
 
 def asdict(value):

@@ -166,7 +166,7 @@ class ToyGoalSelector:
         pass
 
     def state_dict(self) -> dict[str, Any]:
-        return {"rng": self._rng.bit_generator.state, "n_attempts": len(self.attempts)}
+        return {"rng": self._rng.bit_generator.state}
 
     def load_state_dict(self, state: dict[str, Any]) -> None:
         self._rng.bit_generator.state = state["rng"]
@@ -187,8 +187,11 @@ class ToySubgoalSelector:
         best = self._first_step(goal, state)
         return best if available[best] else int(np.flatnonzero(available)[0])
 
-    def predict_allowed(self, goal: int, state: GoalState) -> bool:
-        return self._verdicts.get(_key(goal, state), True)
+    def predict_allowed(self, goal: int, state: GoalState) -> float:
+        return float(self._verdicts.get(_key(goal, state), True))
+
+    def changed_goals(self) -> tuple[int, ...]:
+        return ()
 
     def update(self, attempt: Attempt) -> None:
         if attempt.outcome in (TrialOutcome.ACHIEVED, TrialOutcome.BLOCKED):
