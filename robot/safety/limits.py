@@ -1,0 +1,79 @@
+"""What the gate holds, from the arm's file and what the arm says of itself. Pure values."""
+
+import msgspec
+
+from config.arm import ArmConfig
+from robot.errors import RobotConfigError
+from robot.messages import ArmSpec, Box3, Vec6
+
+__all__ = ["GateLimits"]
+
+BOW_M = 0.02
+"""Joint-space motion between two targets inside the box bows out of it: by 6 mm on a 9 cm leash at full speed."""
+FLOOR_BOW_M = 0.005
+"""Near the table motion is guarded and bows less."""
+SPEED_TOLERANCE = 1e-9
+
+
+class GateLimits(msgspec.Struct, frozen=True, kw_only=True):
+    """Limits of one arm over one table, base frame, per joint base to wrist 3. A value at its limit is allowed."""
+
+    q_min_rad: Vec6
+    q_max_rad: Vec6
+    joint_step_rad: Vec6
+    """Greatest change of a joint's command in one tick."""
+    workspace_m: Box3
+    """Where the commanded tool centre point may be."""
+    tip_min_m: float
+    """Lowest that a fingertip may be commanded, base frame."""
+    finger_reach_m: float
+    """How far a finger's outer edge is from the tool's axis."""
+    tracking_error_rad: float
+    force_max_n: float
+    opening_m: tuple[float, float]
+    grip_force_n: tuple[float, float]
+    grip_speed_m_s: tuple[float, float]
+    output_mask: int
+    """Bits of the outputs that the arm has."""
+    state_max_age_ns: int
+    intent_max_age_ns: int
+    """Age of an intent after which commands must have come to rest: its deadline and the time a stop takes."""
+
+    @classmethod
+    def of(cls, arm: ArmConfig, spec: ArmSpec, *, table_m: float, tick_s: float) -> "GateLimits":
+        """Return the limits that both the arm's file and the arm itself allow.
+
+        Raises:
+            RobotConfigError: the file and the arm are not of the same model, or leave a joint no range.
+        """
+        if spec.model != arm.name:
+            raise RobotConfigError(f"the rig's arm file is for {arm.name!r}, the plant says {spec.model!r}")
+        motion, tool = arm.motion, arm.tool
+        low = tuple(max(j.range_rad[0], q) for j, q in zip(arm.joints, spec.q_min_rad, strict=True))
+        high = tuple(min(j.range_rad[1], q) for j, q in zip(arm.joints, spec.q_max_rad, strict=True))
+        for joint, a, b in zip(arm.joints, low, high, strict=True):
+            if a >= b:
+                raise RobotConfigError(f"joint {joint.name}: file and arm leave no range ({a} .. {b} rad)")
+        speeds = tuple(min(j.speed_rad_s, v) for j, v in zip(arm.joints, spec.qd_max_rad_s, strict=True))
+        t, (lo, hi) = BOW_M, motion.workspace_m
+        rest_s = max(j.speed_rad_s / j.acceleration_rad_s2 + j.acceleration_rad_s2 / j.jerk_rad_s3 for j in arm.joints)
+        return cls(
+            q_min_rad=_vec6(low),
+            q_max_rad=_vec6(high),
+            joint_step_rad=_vec6(tuple(v * tick_s * (1.0 + SPEED_TOLERANCE) for v in speeds)),
+            workspace_m=((lo[0] - t, lo[1] - t, lo[2] - FLOOR_BOW_M), (hi[0] + t, hi[1] + t, hi[2] + t)),
+            tip_min_m=table_m + motion.table_clearance_m,
+            finger_reach_m=tool.stroke_m / 2 + tool.pad_size_m[0],
+            tracking_error_rad=motion.tracking_error_rad,
+            force_max_n=motion.force_limit_n,
+            opening_m=(0.0, min(tool.stroke_m, spec.grip_stroke_m)),
+            grip_force_n=tool.force_n,
+            grip_speed_m_s=tool.speed_m_s,
+            output_mask=(1 << spec.n_outputs) - 1,
+            state_max_age_ns=round(motion.state_max_age_s * 1e9),
+            intent_max_age_ns=round((motion.intent_max_age_s + rest_s) * 1e9),
+        )
+
+
+def _vec6(x: tuple[float, ...]) -> Vec6:
+    return x[0], x[1], x[2], x[3], x[4], x[5]
