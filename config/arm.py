@@ -72,12 +72,12 @@ class MotionLimits(Section, frozen=True, kw_only=True):
     max_step_m: Annotated[float, Meta(gt=0.0, le=0.1)] = 0.022
     leash_m: Span = 0.09
     """How far the target may run ahead of the measured tool."""
-    guard_height_m: Span = 0.17
+    guard_height_m: Span = 0.16
     """Below this height over the table the tool moves at guarded speed."""
-    guarded_speed_m_s: Annotated[float, Meta(gt=0.0, le=0.5)] = 0.15
-    contact_force_n: Positive = 20.0
+    guarded_speed_m_s: Annotated[float, Meta(gt=0.0, le=0.5)] = 0.2
+    contact_force_n: Positive = 15.0
     """Force on the tool at which a descent is stopped and reported as contact."""
-    heights_m: tuple[Span, Span] = (0.025, 0.22)
+    heights_m: tuple[Span, Span] = (0.025, 0.21)
     """Lowest and travel height of the tool centre point over the table."""
     workspace_m: tuple[Point, Point]
     """Corners of the box that the tool centre point may be in, base frame."""

@@ -123,8 +123,8 @@ class RuleSpan(Section, frozen=True, kw_only=True):
 class Start(Section, frozen=True, kw_only=True):
     """Where the tool centre point starts an epoch: a box it is drawn from, base frame."""
 
-    position_m: tuple[Length, Length, Length] = (0.42, 0.0, 0.22)
-    spread_m: tuple[Span, Span, Span] = (0.06, 0.1, 0.01)
+    position_m: tuple[Length, Length, Length] = (0.42, 0.0, 0.21)
+    spread_m: tuple[Span, Span, Span] = (0.06, 0.1, 0.005)
 
 
 class Reflexes(Section, frozen=True, kw_only=True):
