@@ -18,7 +18,7 @@ import placo
 from config.arm import ArmConfig
 from robot.description import tool_down, write_mjcf
 from robot.errors import RobotError
-from robot.messages import Vec3, Vec6
+from robot.messages import Quat, Vec3, Vec6
 
 __all__ = ["Kinematics", "ToolChain", "UnreachableError"]
 
@@ -33,26 +33,22 @@ class UnreachableError(RobotError, ValueError):
 
 
 class ToolChain:
-    """Forward kinematics of the tool's axis in plain floats, for the loops that run every tick."""
+    """Forward kinematics of the tool's axis in plain floats, for the loops that run every tick.
+
+    A point is carried down the chain row by row: p_i-1 = Rz(q_i) Tz(d_i) Tx(a_i) Rx(alpha_i) p_i.
+    """
 
     def __init__(self, arm: ArmConfig) -> None:
         rows = [(j.a_m, j.d_m, math.cos(j.alpha_rad), math.sin(j.alpha_rad)) for j in arm.joints]
         self._rows = tuple(reversed(rows))
+        self._half_twists = tuple((math.cos(j.alpha_rad / 2), math.sin(j.alpha_rad / 2)) for j in arm.joints)
         self._tcp = arm.tool.tcp_m
         x, y, z = arm.tool.tcp_m
         self._tip = (x, y, z + arm.tool.tip_below_tcp_m)
 
     def tcp(self, q_rad: Vec6) -> Vec3:
         """Return the tool centre point for joint angles, base frame, metres."""
-        return self._point(q_rad, self._tcp)
-
-    def tip(self, q_rad: Vec6) -> Vec3:
-        """Return the point between the fingertips for joint angles, base frame, metres."""
-        return self._point(q_rad, self._tip)
-
-    def _point(self, q_rad: Vec6, point_m: Vec3) -> Vec3:
-        """Carry a point of the flange frame down the chain: p_i-1 = Rz(q) Tz(d) Tx(a) Rx(alpha) p_i."""
-        x, y, z = point_m
+        x, y, z = self._tcp
         i = N_JOINTS
         for a, d, ca, sa in self._rows:
             i -= 1
@@ -60,6 +56,29 @@ class ToolChain:
             u, v = x + a, ca * y - sa * z
             x, y, z = c * u - s * v, s * u + c * v, sa * y + ca * z + d
         return x, y, z
+
+    def tcp_and_tip(self, q_rad: Vec6) -> tuple[Vec3, Vec3]:
+        """Return the tool centre point and the point between the fingertips, base frame, metres."""
+        x, y, z = self._tcp
+        tx, ty, tz = self._tip
+        i = N_JOINTS
+        for a, d, ca, sa in self._rows:
+            i -= 1
+            s, c = math.sin(q_rad[i]), math.cos(q_rad[i])
+            u, v = x + a, ca * y - sa * z
+            x, y, z = c * u - s * v, s * u + c * v, sa * y + ca * z + d
+            u, v = tx + a, ca * ty - sa * tz
+            tx, ty, tz = c * u - s * v, s * u + c * v, sa * ty + ca * tz + d
+        return (x, y, z), (tx, ty, tz)
+
+    def quat(self, q_rad: Vec6) -> Quat:
+        """Return the tool's turn, scalar first: the product of Rz(q_i) Rx(alpha_i) as unit quaternions."""
+        w, x, y, z = 1.0, 0.0, 0.0, 0.0
+        for q, (ca, sa) in zip(q_rad, self._half_twists, strict=True):
+            c, s = math.cos(q / 2), math.sin(q / 2)
+            w, x, y, z = c * w - s * z, c * x + s * y, c * y - s * x, c * z + s * w
+            w, x, y, z = ca * w - sa * x, ca * x + sa * w, ca * y + sa * z, ca * z - sa * y
+        return w, x, y, z
 
 
 class Kinematics:

@@ -1,1 +1,6 @@
-"""From an intent to jerk-limited joint targets."""
+"""Intents to joint targets, and the reflexes of the hand."""
+
+from robot.motion.mover import Mover
+from robot.motion.reflexes import HandReflexes
+
+__all__ = ["HandReflexes", "Mover"]

@@ -1,0 +1,32 @@
+"""Small pure functions on points, turns and the tool's frame, in plain floats."""
+
+import math
+
+from robot.messages import Quat, Vec3
+
+__all__ = ["inside_box", "tool_offset", "turn_about_vertical"]
+
+
+def tool_offset(point_m: Vec3, tcp_m: Vec3, yaw_rad: float) -> Vec3:
+    """Return where a point lies seen from a tool that points down: (across the pads, along the jaws, below).
+
+    At yaw 0 the first axis is the base's x, the second its -y; the third is positive below the tool centre point.
+    """
+    c, s = math.cos(yaw_rad), math.sin(yaw_rad)
+    dx, dy = point_m[0] - tcp_m[0], point_m[1] - tcp_m[1]
+    return c * dx + s * dy, s * dx - c * dy, tcp_m[2] - point_m[2]
+
+
+def inside_box(point_m: Vec3, low_m: Vec3, high_m: Vec3, tolerance_m: float = 0.0) -> bool:
+    """Return whether a point lies in an axis-aligned box; a point that is not finite does not."""
+    return (
+        low_m[0] - tolerance_m <= point_m[0] <= high_m[0] + tolerance_m
+        and low_m[1] - tolerance_m <= point_m[1] <= high_m[1] + tolerance_m
+        and low_m[2] - tolerance_m <= point_m[2] <= high_m[2] + tolerance_m
+    )
+
+
+def turn_about_vertical(quat: Quat) -> float:
+    """Return the yaw in (-pi, pi] of a unit quaternion, scalar first: the angle of its turned x axis in the plane."""
+    w, x, y, z = quat
+    return math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))

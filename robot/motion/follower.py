@@ -1,0 +1,185 @@
+"""The set-point that follows a target: straight lines of the tool pointing down, or joints, jerk-limited either way."""
+
+import math
+
+from config.arm import ArmConfig
+from robot.geometry import turn_about_vertical
+from robot.kinematics import Kinematics, UnreachableError
+from robot.messages import Vec3, Vec6
+from robot.motion.limiter import AxisLimits, Limiter
+
+__all__ = ["Follower"]
+
+SPEED_SHARE = 0.95
+"""Share of a joint's greatest speed that motion uses, so that the gate's limit is never met by rounding."""
+ALIGN_RAD = 0.01
+"""A tool tilted or turned by less than this points down as far as motion cares; the next tick sets it right."""
+STILL_RAD_S = 1e-3
+ALIGN_STEP_RAD = 0.35
+"""Greatest change of any joint's target in one step while the tool is brought upright."""
+TURN_RAD_S, TURN_RAD_S2, TURN_RAD_S3 = 2.0, 10.0, 200.0
+"""Bounds of the tool's turn about the vertical."""
+
+
+class Follower:
+    """Joint set-points of one arm, tick by tick.
+
+    While the tool points down its coordinates (x, y, z, yaw) are limited and joints follow by inverse kinematics, so
+    that it moves straight and never past its target. For joint targets, or while the tool is not upright, the joints
+    themselves are limited.
+
+    Attributes:
+        q_rad: Joints of the last tick.
+        target_m: Where the tool centre point will rest.
+        yaw_rad: Turn at which it will rest.
+        trouble: What went wrong in the last tick, if anything: the joints brake.
+    """
+
+    def __init__(self, arm: ArmConfig, *, tick_s: float) -> None:
+        motion, joints = arm.motion, arm.joints
+        self._kinematics = Kinematics(arm)
+        self._home_yaw_rad = arm.tool_yaw_rad
+        self._tick_s = tick_s
+        self._tool = Limiter(
+            AxisLimits(
+                speed=(*(motion.speed_m_s,) * 3, TURN_RAD_S),
+                acceleration=(*(motion.acceleration_m_s2,) * 3, TURN_RAD_S2),
+                jerk=(*(motion.jerk_m_s3,) * 3, TURN_RAD_S3),
+            ),
+            tick_s=tick_s,
+        )
+        self._joints = Limiter(
+            AxisLimits(
+                speed=tuple(SPEED_SHARE * j.speed_rad_s for j in joints),
+                acceleration=tuple(j.acceleration_rad_s2 for j in joints),
+                jerk=tuple(j.jerk_rad_s3 for j in joints),
+            ),
+            tick_s=tick_s,
+        )
+        self._joint_step_rad = tuple(SPEED_SHARE * j.speed_rad_s * tick_s for j in joints)
+        self.seed(arm.home_rad)
+
+    def seed(self, q_rad: Vec6) -> None:
+        """Rest at these joints; everything before is forgotten."""
+        self.q_rad = self._q_before_rad = q_rad
+        self.trouble: str | None = None
+        self.target_m = self._kinematics.tcp(q_rad)
+        self.yaw_rad = self._home_yaw_rad
+        self._is_upright = False
+        self._joints.seed(list(q_rad))
+        self._take_up_tool()
+
+    def tcp(self, q_rad: Vec6) -> Vec3:
+        """Return the tool centre point for joint angles, base frame, metres."""
+        return self._kinematics.tcp(q_rad)
+
+    @property
+    def joint_target_rad(self) -> Vec6:
+        """Where the joints will rest, as far as it is known before they get there."""
+        return self.q_rad if self._is_upright else _vec6(self._joints.target)
+
+    def aim(self, target_m: Vec3, yaw_rad: float) -> bool:
+        """Go to a place with the tool pointing down. Returns False where no joints lead there; then nothing changes."""
+        if not self._is_upright:
+            self._take_up_tool()
+        if self._is_upright:
+            self._tool.aim([*target_m, yaw_rad])
+            self.target_m, self.yaw_rad = target_m, yaw_rad
+            return True
+        return self._align(target_m, yaw_rad)
+
+    def aim_joints(self, q_rad: Vec6) -> None:
+        """Go to joint angles."""
+        if self._is_upright:
+            self._take_up_joints()
+        self._joints.aim(list(q_rad))
+        self.target_m = self._kinematics.tcp(q_rad)
+
+    def brake(self) -> None:
+        """Come to rest as soon as the limits allow."""
+        if self._is_upright:
+            x, y, z, self.yaw_rad = self._tool.brake()
+            self.target_m = (x, y, z)
+        else:
+            self.target_m = self._kinematics.tcp(_vec6(self._joints.brake()))
+
+    def step(self) -> Vec6:
+        """Advance by one tick and return the joints to command."""
+        self.trouble = None
+        q = self._step_tool() if self._is_upright else _vec6(self._joints.step())
+        if self._tool.is_failed or self._joints.is_failed:
+            self.trouble = "brake"
+        self._q_before_rad, self.q_rad = self.q_rad, q
+        return q
+
+    def _step_tool(self) -> Vec6:
+        x, y, z, yaw = self._tool.step()
+        ahead = _between(self._q_before_rad, self.q_rad, 2.0)
+        try:
+            q = self._kinematics.solve((x, y, z), ahead, yaw_rad=yaw)
+        except UnreachableError:
+            self._take_up_joints()
+            self.brake()
+            self.trouble = "unreachable"
+            return _vec6(self._joints.step())
+        return self._slow(q)
+
+    def _slow(self, q: Vec6) -> Vec6:
+        """Hold the tool back where a joint would be too fast, as near the base; it goes on at the speed it was let."""
+        excess = max(abs(a - b) / most for a, b, most in zip(q, self.q_rad, self._joint_step_rad, strict=True))
+        if excess <= 1.0:
+            return q
+        share = 1.0 / excess
+        slowed = _between(self.q_rad, q, share)
+        target, speed = self._tool.target, [v * share for v in self._tool.speed]
+        yaw = turn_about_vertical(self._kinematics.chain.quat(slowed))
+        self._tool.seed([*self._kinematics.tcp(slowed), _near(yaw, target[3])], speed)
+        self._tool.aim(target)
+        return slowed
+
+    def _take_up_tool(self) -> None:
+        """Go on by the tool's coordinates, if it points down and the joints are at rest."""
+        if max(abs(v) for v in self._joints.speed) > STILL_RAD_S:
+            return
+        quat = self._kinematics.chain.quat(self.q_rad)
+        tilt = 2.0 * math.hypot(quat[0], quat[3])  # a tool that points straight down is turned by (0, x, y, 0)
+        if tilt > ALIGN_RAD:
+            return
+        yaw = _near(turn_about_vertical(quat), self._home_yaw_rad)
+        if abs(yaw - self._home_yaw_rad) < ALIGN_RAD:
+            yaw = self._home_yaw_rad
+        self._is_upright = True
+        self._q_before_rad = self.q_rad
+        self.target_m, self.yaw_rad = self._kinematics.tcp(self.q_rad), yaw
+        self._tool.seed([*self.target_m, yaw])
+
+    def _take_up_joints(self) -> None:
+        """Go on by the joints, from where they are and as fast as they go."""
+        self._is_upright = False
+        speed = [(a - b) / self._tick_s for a, b in zip(self.q_rad, self._q_before_rad, strict=True)]
+        self._joints.seed(list(self.q_rad), speed)
+
+    def _align(self, target_m: Vec3, yaw_rad: float) -> bool:
+        """Bring the tool upright on the way to a place, by a bounded change of the joints."""
+        now = _vec6(self._joints.target)
+        try:
+            q = self._kinematics.solve(target_m, now, yaw_rad=yaw_rad)
+        except UnreachableError:
+            return False
+        largest = max(abs(a - b) for a, b in zip(q, now, strict=True))
+        self.aim_joints(_between(now, q, min(1.0, ALIGN_STEP_RAD / largest)) if largest > 0.0 else q)
+        self.yaw_rad = yaw_rad
+        return True
+
+
+def _near(angle: float, reference: float) -> float:
+    """Return the angle plus the whole turns that bring it nearest a reference."""
+    return angle - math.tau * round((angle - reference) / math.tau)
+
+
+def _between(a: Vec6, b: Vec6, share: float) -> Vec6:
+    return _vec6([u + share * (v - u) for u, v in zip(a, b, strict=True)])
+
+
+def _vec6(x: list[float]) -> Vec6:
+    return x[0], x[1], x[2], x[3], x[4], x[5]

@@ -1,0 +1,113 @@
+"""From a target to the next tick's set-point: ruckig, with speed, acceleration and jerk bounded on every axis."""
+
+import msgspec
+import ruckig
+
+__all__ = ["AxisLimits", "Limiter"]
+
+
+class AxisLimits(msgspec.Struct, frozen=True, kw_only=True):
+    """Greatest speed, acceleration and jerk of each axis, in the axes' own units."""
+
+    speed: tuple[float, ...]
+    acceleration: tuple[float, ...]
+    jerk: tuple[float, ...]
+
+
+class Limiter:
+    """Moves n axes from where they are to a target that may change at any tick, and rests on it without overshoot.
+
+    The axes are joints or the tool's coordinates; the limiter does not care.
+
+    Attributes:
+        is_failed: The last step met an input that ruckig refused; every axis brakes instead.
+    """
+
+    def __init__(self, limits: AxisLimits, *, tick_s: float) -> None:
+        self._n = len(limits.speed)
+        self._tick_s = tick_s
+        self._speed, self._acceleration, self._jerk = list(limits.speed), list(limits.acceleration), list(limits.jerk)
+        self._rest = [0.0] * self._n
+        self.seed(self._rest)
+
+    def seed(self, at: list[float], speed: list[float] | None = None) -> None:
+        """Start at a place, at rest or at a speed, aiming at that place; everything before is forgotten.  (n,), (n,)"""
+        self._otg = ruckig.Ruckig(self._n, self._tick_s)
+        self._now = self._bounded()
+        self._next = ruckig.OutputParameter(self._n)
+        self._put(at, speed or self._rest, self._rest)
+        self._now.target_velocity = self._now.target_acceleration = self._rest
+        self.aim(at)
+
+    @property
+    def at(self) -> list[float]:
+        """Where the axes are set to.  () -> (n,)"""
+        return self._now.current_position
+
+    @property
+    def speed(self) -> list[float]:
+        """How fast they are set to go.  () -> (n,)"""
+        return self._now.current_velocity
+
+    @property
+    def target(self) -> list[float]:
+        """Where they will rest.  () -> (n,)"""
+        return self._target
+
+    def aim(self, target: list[float]) -> None:
+        """Set where to rest.  (n,)"""
+        self._target = target
+        self._now.target_position = target
+        self.is_failed = False
+
+    def brake(self) -> list[float]:
+        """Aim at the nearest place where the axes can come to rest, and return it.  () -> (n,)"""
+        stopping = self._bounded()
+        stopping.control_interface = ruckig.ControlInterface.Velocity
+        stopping.current_position = self._now.current_position
+        stopping.current_velocity = self._now.current_velocity
+        stopping.current_acceleration = self._now.current_acceleration
+        stopping.target_velocity = stopping.target_acceleration = self._rest
+        path = ruckig.Trajectory(self._n)
+        try:
+            self._otg.calculate(stopping, path)
+        except ruckig.RuckigError:
+            self.aim(self.at)
+        else:
+            self.aim(path.at_time(path.duration)[0])
+        return self._target
+
+    def step(self) -> list[float]:
+        """Advance by one tick and return where the axes are set to.  () -> (n,)"""
+        try:
+            result = self._otg.update(self._now, self._next)
+        except ruckig.RuckigError:
+            return self._brake_by_hand()
+        if result not in (ruckig.Result.Working, ruckig.Result.Finished):
+            return self._brake_by_hand()
+        self._next.pass_to_input(self._now)
+        return self._next.new_position
+
+    def _bounded(self) -> ruckig.InputParameter:
+        bounded = ruckig.InputParameter(self._n)
+        bounded.max_velocity, bounded.max_acceleration, bounded.max_jerk = self._speed, self._acceleration, self._jerk
+        return bounded
+
+    def _brake_by_hand(self) -> list[float]:
+        """Bounded stop where ruckig has no answer: every axis loses speed at its acceleration limit, and rests there."""
+        self.is_failed = True
+        dt = self._tick_s
+        at, speed = self._now.current_position, self._now.current_velocity
+        for i in range(self._n):
+            loss = self._acceleration[i] * dt
+            speed[i] -= min(max(speed[i], -loss), loss)
+            at[i] += speed[i] * dt
+        self._put(at, speed, self._rest)
+        if not any(speed):
+            self._target = self._now.target_position = at
+        return at
+
+    def _put(self, at: list[float], speed: list[float], acceleration: list[float]) -> None:
+        self._now.current_position = at
+        self._now.current_velocity = speed
+        self._now.current_acceleration = acceleration

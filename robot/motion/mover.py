@@ -1,0 +1,132 @@
+"""Intents become joint set-points: shape, fence, guard by force, follow. State of one arm's motion."""
+
+import math
+
+from config.arm import ArmConfig
+from robot.messages import ArmState, Heading, Intent, JointTarget, Twist, Vec3, Vec6
+from robot.motion.contact import ContactGuard
+from robot.motion.follower import Follower
+from robot.motion.target import MAX_TURN_RAD, Shaped, TargetLimits, advance_heading, advance_twist, fence
+
+__all__ = ["Mover"]
+
+JOINT_STEP_RAD = 0.35
+"""Greatest change of any joint's target in one step."""
+RESEAT_SHARE = 0.9
+"""Share of a joint's greatest speed at which commands fall back to the measured joints on contact."""
+
+
+class Mover:
+    """Carries the target from intent to intent. `seed` forgets everything before."""
+
+    def __init__(self, arm: ArmConfig, *, table_m: float, tick_s: float) -> None:
+        self._limits = TargetLimits.of(arm, table_m)
+        self._follower = Follower(arm, tick_s=tick_s)
+        self._contact = ContactGuard(arm)
+        self._ranges = tuple(j.range_rad for j in arm.joints)
+        self._fall_back_rad = tuple(RESEAT_SHARE * j.speed_rad_s * tick_s for j in arm.joints)
+        self._limiters: list[str] = []
+
+    @property
+    def target_m(self) -> Vec3:
+        """Where the tool centre point will rest if nothing more is asked."""
+        return self._follower.target_m
+
+    @property
+    def limiters(self) -> tuple[str, ...]:
+        """What shortened or changed the present step so far, in order, each once."""
+        return tuple(dict.fromkeys(self._limiters))
+
+    @property
+    def is_in_contact(self) -> bool:
+        """Whether something holds the tool up."""
+        return self._contact.is_in_contact
+
+    def seed(self, state: ArmState) -> None:
+        """Rest at the measured joints and forget everything before."""
+        self._follower.seed(state.q_rad)
+        self._contact.reset()
+        self._limiters = []
+
+    def begin_step(self, intent: Intent, state: ArmState, *, duration_s: float) -> None:
+        """Move the target as an intent asks for one time step. The gate has admitted the intent."""
+        self._limiters = []
+        at, yaw = self._follower.target_m, self._follower.yaw_rad
+        if isinstance(intent, Heading):
+            self._follow(advance_heading(at, intent, self._limits, duration_s), yaw, state)
+        elif isinstance(intent, Twist):
+            turn = intent.angular_rad_s[2] * duration_s
+            yaw += min(max(turn, -MAX_TURN_RAD), MAX_TURN_RAD)
+            self._follow(advance_twist(at, intent, self._limits, duration_s), yaw, state)
+        elif isinstance(intent, JointTarget):
+            self._aim_joints(intent.q_rad, state, duration_s)
+        else:
+            self._follower.brake()
+
+    def hold(self, because: str) -> None:
+        """Come to rest in place of what an intent asks."""
+        self._limiters = [because]
+        self._follower.brake()
+
+    def tick(self, state: ArmState) -> Vec6:
+        """Return the joints to command for this tick, eased by the measured force."""
+        follower = self._follower
+        moved = self._contact.reseat(state.tcp_force_n, state.tcp_position_m, follower.target_m)
+        if moved is not None:
+            self._limiters.append("contact")
+            yaw = follower.yaw_rad
+            follower.seed(self._back_to(state.q_rad))
+            follower.aim(moved, yaw)
+        q = follower.step()
+        if follower.trouble is not None:
+            self._limiters.append(follower.trouble)
+        return q
+
+    def _follow(self, shaped: Shaped, yaw_rad: float, state: ArmState) -> None:
+        self._limiters.extend(shaped.limiters)
+        eased, is_eased = self._contact.ease(self._follower.target_m, shaped.position_m)
+        if is_eased:
+            self._limiters.append("contact")
+        fenced = fence(eased, state.tcp_position_m, self._limits)
+        self._limiters.extend(fenced.limiters)
+        if not self._follower.aim(fenced.position_m, yaw_rad):
+            self._limiters.append("unreachable")
+
+    def _aim_joints(self, wanted_rad: Vec6, state: ArmState, duration_s: float) -> None:
+        """Move the joint target towards given joints, the tool by no more than a step and inside the fences."""
+        limits, follower = self._limits, self._follower
+        now = follower.joint_target_rad
+        inside = [min(max(v, low), high) for v, (low, high) in zip(wanted_rad, self._ranges, strict=True)]
+        if any(a != b for a, b in zip(inside, wanted_rad, strict=True)):
+            self._limiters.append("joint_range")
+        here = follower.tcp(now)
+        longest = limits.max_step_m if here[2] > limits.guard_z_m else limits.guarded_speed_m_s * duration_s
+        change = [b - a for a, b in zip(now, inside, strict=True)]
+        share = min(1.0, JOINT_STEP_RAD / max(1e-12, *(abs(c) for c in change)))
+        q = _along(now, change, share)
+        for _ in range(3):  # over one step the tool's path is nearly proportional to the joints'
+            moved = math.dist(follower.tcp(q), here)
+            if moved <= longest:
+                break
+            share *= 0.999 * longest / moved
+            q = _along(now, change, share)
+        if share < 1.0:
+            self._limiters.append("max_step")
+        fenced = fence(follower.tcp(q), state.tcp_position_m, limits)
+        if fenced.limiters:
+            self._limiters.extend(fenced.limiters)
+            return
+        follower.aim_joints(q)
+
+    def _back_to(self, measured_rad: Vec6) -> Vec6:
+        """Return the command brought back to the measured joints as far as one tick allows."""
+        now = self._follower.q_rad
+        back = [
+            a + min(max(b - a, -most), most) for a, b, most in zip(now, measured_rad, self._fall_back_rad, strict=True)
+        ]
+        return back[0], back[1], back[2], back[3], back[4], back[5]
+
+
+def _along(a: Vec6, change: list[float], share: float) -> Vec6:
+    x = [u + share * v for u, v in zip(a, change, strict=True)]
+    return x[0], x[1], x[2], x[3], x[4], x[5]

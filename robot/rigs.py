@@ -1,0 +1,56 @@
+"""A rig becomes a station: the implementations that its file names are loaded and put together."""
+
+from importlib import import_module
+from typing import Any
+
+from config.arm import ArmConfig
+from config.resolved import Resolved
+from config.rig import Rig
+from config.scenario import Scenario
+from robot.errors import RobotConfigError
+from robot.hal.protocols import Plant
+from robot.local_station import LocalStation
+from robot.safety import Operator
+
+__all__ = ["build_operator", "build_plant", "build_station", "load"]
+
+
+def load(import_string: str) -> Any:  # noqa: ANN401 - what a string names is known only at run time
+    """Return what `package.module:Name` names.
+
+    Raises:
+        RobotConfigError: there is no such module or name.
+    """
+    module, _, name = import_string.partition(":")
+    try:
+        return getattr(import_module(module), name)
+    except (ImportError, AttributeError) as error:
+        raise RobotConfigError(f"expected an import string module:Name that exists, came {import_string!r}: {error}") from error
+
+
+def build_plant(*, rig: Rig, arm: ArmConfig, scenario: Scenario) -> Plant:
+    """Return the plant that a rig names, not yet connected."""
+    return load(rig.plant)(arm=arm, scenario=scenario, rig=rig)
+
+
+def build_station(resolved: Resolved, *, plant: Plant | None = None) -> LocalStation:
+    """Return the station of a resolved config, disarmed and not yet connected.
+
+    Args:
+        resolved: Rig, arm, scenario and rule sets.
+        plant: One that is already made, in place of the rig's.
+    """
+    rig, arm, scenario = resolved.rig, resolved.arm, resolved.scenario
+    return LocalStation(
+        plant=build_plant(rig=rig, arm=arm, scenario=scenario) if plant is None else plant,
+        perception=load(rig.perception)(scenario=scenario, arm=arm),
+        arm=arm,
+        scenario=scenario,
+        rule_sets=resolved.rule_sets,
+        rig=rig,
+    )
+
+
+def build_operator(rig: Rig) -> Operator | None:
+    """Return who arms this rig's station without hardware, None where a person must."""
+    return None if rig.operator is None else load(rig.operator)()

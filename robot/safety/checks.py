@@ -1,0 +1,230 @@
+"""The gate's checks: pure functions that say None or why not. Finiteness is the first of them."""
+
+import math
+from enum import StrEnum
+
+import msgspec
+
+from robot.geometry import inside_box
+from robot.kinematics import ToolChain
+from robot.messages import (
+    ArmCommand,
+    ArmMode,
+    ArmState,
+    Grip,
+    Heading,
+    Hold,
+    JointTarget,
+    Twist,
+    Vec6,
+)
+from robot.safety.limits import GateLimits
+
+__all__ = [
+    "Reason",
+    "Refusal",
+    "check_finite",
+    "check_force",
+    "check_grip",
+    "check_intent",
+    "check_intent_age",
+    "check_joint_range",
+    "check_joint_speed",
+    "check_outputs",
+    "check_sequence",
+    "check_state",
+    "check_tool",
+    "check_tracking",
+]
+
+N_JOINTS = 6
+REASON_M, REASON_RAD, REASON_M_S = 10.0, 1e3, 10.0
+"""An intent beyond these is not large but wrong."""
+
+
+class Reason(StrEnum):
+    """Why something was refused."""
+
+    MALFORMED = "malformed"
+    NOT_FINITE = "not_finite"
+    OUT_OF_REASON = "out_of_reason"
+    SEQUENCE = "sequence"
+    STALE_STATE = "stale_state"
+    STALE_INTENT = "stale_intent"
+    ARM_MODE = "arm_mode"
+    JOINT_RANGE = "joint_range"
+    JOINT_SPEED = "joint_speed"
+    WORKSPACE = "workspace"
+    TABLE = "table"
+    TRACKING = "tracking"
+    FORCE = "force"
+    GRIP = "grip"
+    OUTPUTS = "outputs"
+
+
+class Refusal(msgspec.Struct, frozen=True):
+    """Why not, what was expected and what came, and by how much it was too much (in the check's own unit)."""
+
+    reason: Reason
+    detail: str
+    amount: float = 0.0
+
+
+def check_intent(intent: object) -> Refusal | None:
+    """Refuse what is no intent, is not finite or cannot be meant. Large but meant intents are shaped, not refused."""
+    if not isinstance(intent, Heading | Twist | JointTarget | Hold):
+        return Refusal(Reason.MALFORMED, f"expected Heading, Twist, JointTarget or Hold, came {type(intent).__name__}")
+    if not (intent.grip is None or isinstance(intent.grip, Grip)):
+        return Refusal(Reason.MALFORMED, f"expected grip open, close or nothing, came {intent.grip!r}")
+    try:
+        return _check_intent_values(intent)
+    except (TypeError, ValueError) as error:
+        return Refusal(Reason.MALFORMED, f"expected numbers in {type(intent).__name__}: {error}")
+
+
+def _check_intent_values(intent: Heading | Twist | JointTarget | Hold) -> Refusal | None:
+    if isinstance(intent, Heading):
+        values, most = (intent.heading_rad, intent.distance_m, intent.height_m), (REASON_RAD, REASON_M, REASON_M)
+    elif isinstance(intent, Twist):
+        values, most = (*intent.linear_m_s, *intent.angular_rad_s), (*(REASON_M_S,) * 3, *(REASON_RAD,) * 3)
+    elif isinstance(intent, JointTarget):
+        values, most = tuple(intent.q_rad), (REASON_RAD,) * N_JOINTS
+    else:
+        return None
+    if len(values) != len(most):
+        return Refusal(Reason.MALFORMED, f"expected {len(most)} numbers in {type(intent).__name__}, came {len(values)}")
+    if not all(math.isfinite(v) for v in values):
+        return Refusal(Reason.NOT_FINITE, f"expected finite numbers in {type(intent).__name__}, came {values}")
+    for value, limit in zip(values, most, strict=True):
+        if abs(value) > limit:
+            return Refusal(Reason.OUT_OF_REASON, f"expected at most {limit:g}, came {value:g}", abs(value) - limit)
+    if isinstance(intent, Heading) and intent.distance_m < 0.0:
+        return Refusal(Reason.OUT_OF_REASON, f"expected a distance of 0 or more, came {intent.distance_m:g} m")
+    return None
+
+
+def check_finite(command: ArmCommand) -> Refusal | None:
+    """Refuse a command with anything but six finite joints, a finite grip and an integer of outputs."""
+    grip = command.grip
+    try:
+        if len(command.q_rad) != N_JOINTS:
+            return Refusal(Reason.MALFORMED, f"expected {N_JOINTS} joints, came {len(command.q_rad)}")
+        # A sum is finite only if every term is: infinities of opposite sign make NaN.
+        if not math.isfinite(sum(command.q_rad) + grip.opening_m + grip.force_n + grip.speed_m_s):
+            return Refusal(Reason.NOT_FINITE, f"expected finite joints and grip, came {command.q_rad}, {grip}")
+    except (TypeError, AttributeError) as error:
+        return Refusal(Reason.MALFORMED, f"expected numbers in the command: {error}")
+    if type(command.digital_out) is not int:
+        return Refusal(Reason.MALFORMED, f"expected outputs as bits, came {command.digital_out!r}")
+    return None
+
+
+def check_sequence(command: ArmCommand, previous: int) -> Refusal | None:
+    """Refuse a command that is not the one after the last."""
+    if command.sequence == previous + 1:
+        return None
+    return Refusal(Reason.SEQUENCE, f"expected command {previous + 1}, came {command.sequence}")
+
+
+def check_state(state: ArmState, command: ArmCommand, now_ns: int, limits: GateLimits) -> Refusal | None:
+    """Refuse to act on an old or future measurement, with an old command, or on an arm that does not run."""
+    oldest = now_ns - limits.state_max_age_ns
+    if not oldest <= state.stamp_ns <= now_ns:
+        return _stale("state", state.stamp_ns, now_ns, limits)
+    if not oldest <= command.stamp_ns <= now_ns:
+        return _stale("command", command.stamp_ns, now_ns, limits)
+    if state.mode is not ArmMode.RUNNING:
+        return Refusal(Reason.ARM_MODE, f"expected a running arm, it is {state.mode}")
+    return None
+
+
+def _stale(what: str, stamp_ns: int, now_ns: int, limits: GateLimits) -> Refusal:
+    age_ms, most_ms = (now_ns - stamp_ns) / 1e6, limits.state_max_age_ns / 1e6
+    return Refusal(Reason.STALE_STATE, f"expected a {what} of 0 to {most_ms:g} ms, came {age_ms:g} ms", age_ms / 1e3)
+
+
+def check_intent_age(intent_ns: int, now_ns: int, limits: GateLimits) -> Refusal | None:
+    """Refuse motion long after the last intent."""
+    age_ns = now_ns - intent_ns
+    if 0 <= age_ns <= limits.intent_max_age_ns:
+        return None
+    most_s = limits.intent_max_age_ns / 1e9
+    return Refusal(Reason.STALE_INTENT, f"expected rest {most_s:g} s after an intent, came motion at {age_ns / 1e9:g} s")
+
+
+def check_joint_range(q_rad: Vec6, limits: GateLimits) -> Refusal | None:
+    """Refuse a joint outside its range."""
+    for i, (low, q, high) in enumerate(zip(limits.q_min_rad, q_rad, limits.q_max_rad, strict=True)):
+        if not low <= q <= high:
+            detail = f"joint {i + 1}: expected {low:g} to {high:g} rad, came {q:g}"
+            return Refusal(Reason.JOINT_RANGE, detail, max(low - q, q - high))
+    return None
+
+
+def check_joint_speed(q_rad: Vec6, previous_rad: Vec6, limits: GateLimits) -> Refusal | None:
+    """Refuse a joint that would move further in one tick than its speed allows."""
+    for i, (now, before, most) in enumerate(zip(q_rad, previous_rad, limits.joint_step_rad, strict=True)):
+        if not abs(now - before) <= most:
+            detail = f"joint {i + 1}: expected a change of at most {most:g} rad a tick, came {now - before:g}"
+            return Refusal(Reason.JOINT_SPEED, detail, abs(now - before) - most)
+    return None
+
+
+def check_tool(q_rad: Vec6, chain: ToolChain, limits: GateLimits) -> Refusal | None:
+    """Refuse joints that bring the tool centre point out of the workspace or a fingertip too near the table."""
+    tcp, tip = chain.tcp_and_tip(q_rad)
+    low, high = limits.workspace_m
+    if not inside_box(tcp, low, high):
+        by = max(max(a - x, x - b) for a, x, b in zip(low, tcp, high, strict=True))
+        return Refusal(Reason.WORKSPACE, f"expected the tool within {low} to {high} m, came {_round(tcp)}", by)
+    reach = math.dist(tcp, tip)
+    tilt = math.sqrt(max(0.0, 1.0 - ((tcp[2] - tip[2]) / reach) ** 2))
+    lowest = tip[2] - limits.finger_reach_m * tilt
+    if not lowest >= limits.tip_min_m:
+        detail = f"expected fingertips at {limits.tip_min_m:g} m or higher, came {lowest:g}"
+        return Refusal(Reason.TABLE, detail, limits.tip_min_m - lowest)
+    return None
+
+
+def check_tracking(q_rad: Vec6, measured_rad: Vec6, limits: GateLimits) -> Refusal | None:
+    """Refuse when the measured joints do not follow, or are not finite."""
+    for i, (asked, is_at) in enumerate(zip(q_rad, measured_rad, strict=True)):
+        if not abs(asked - is_at) <= limits.tracking_error_rad:
+            detail = f"joint {i + 1}: expected it within {limits.tracking_error_rad:g} rad, came {is_at - asked:g}"
+            return Refusal(Reason.TRACKING, detail, abs(asked - is_at) - limits.tracking_error_rad)
+    return None
+
+
+def check_force(state: ArmState, limits: GateLimits) -> Refusal | None:
+    """Refuse when the tool is pushed too hard, or the force is not finite."""
+    force = math.hypot(*state.tcp_force_n)
+    if force <= limits.force_max_n:
+        return None
+    detail = f"expected at most {limits.force_max_n:g} N on the tool, came {force:g}"
+    return Refusal(Reason.FORCE, detail, force - limits.force_max_n)
+
+
+def check_grip(command: ArmCommand, limits: GateLimits) -> Refusal | None:
+    """Refuse an opening, force or speed that the hand does not have."""
+    grip = command.grip
+    for name, value, (low, high) in (
+        ("opening_m", grip.opening_m, limits.opening_m),
+        ("force_n", grip.force_n, limits.grip_force_n),
+        ("speed_m_s", grip.speed_m_s, limits.grip_speed_m_s),
+    ):
+        if not low <= value <= high:
+            detail = f"grip.{name}: expected {low:g} to {high:g}, came {value:g}"
+            return Refusal(Reason.GRIP, detail, max(low - value, value - high))
+    return None
+
+
+def check_outputs(command: ArmCommand, limits: GateLimits) -> Refusal | None:
+    """Refuse outputs that the arm does not have."""
+    stray = command.digital_out & ~limits.output_mask
+    if not stray:
+        return None
+    return Refusal(Reason.OUTPUTS, f"expected bits within {limits.output_mask:#x}, came {command.digital_out:#x}")
+
+
+def _round(point: tuple[float, float, float]) -> tuple[float, ...]:
+    return tuple(round(x, 4) for x in point)

@@ -1,0 +1,120 @@
+"""The safety gate: the only caller of Arm.write. It passes or refuses; a refusal latches."""
+
+from robot.hal.protocols import Arm
+from robot.kinematics import ToolChain
+from robot.messages import ArmCommand, ArmState, Outcome, Verdict
+from robot.safety.checks import (
+    Reason,
+    Refusal,
+    check_finite,
+    check_force,
+    check_grip,
+    check_intent,
+    check_intent_age,
+    check_joint_range,
+    check_joint_speed,
+    check_outputs,
+    check_sequence,
+    check_state,
+    check_tool,
+    check_tracking,
+)
+from robot.safety.limits import GateLimits
+
+__all__ = ["Gate"]
+
+
+class Gate:
+    """Stands between motion and one arm. State: the last command sent, and the latch.
+
+    After a refusal nothing is written any more: the arm is stopped where it is, the hand holds what it holds, lamps
+    and lids stay as they are, until `seed` after an operator has cleared the latch.
+    """
+
+    def __init__(self, *, arm: Arm, limits: GateLimits, chain: ToolChain) -> None:
+        self._arm, self._limits, self._chain = arm, limits, chain
+        self._sequence = 0
+        self._q_rad = (0.0,) * 6
+        self._intent_ns = 0
+        self._latched: Refusal | None = None
+
+    @property
+    def limits(self) -> GateLimits:
+        """What the gate holds."""
+        return self._limits
+
+    @property
+    def is_latched(self) -> bool:
+        """Whether everything is refused until `seed`."""
+        return self._latched is not None
+
+    @property
+    def next_sequence(self) -> int:
+        """Number that the next command must carry."""
+        return self._sequence + 1
+
+    def seed(self, state: ArmState) -> None:
+        """Start from the measured joints at rest, latch cleared. For the station, after arming or a reset only."""
+        self._q_rad = state.q_rad
+        self._sequence = 0
+        self._intent_ns = state.stamp_ns
+        self._latched = None
+
+    def admit(self, intent: object, *, now_ns: int) -> Verdict | None:
+        """Take note of a fresh intent. A wrong one is refused and latches; None means admitted."""
+        refusal = self._latched or check_intent(intent)
+        if refusal is None:
+            self._intent_ns = now_ns
+            return None
+        return self._refuse(refusal, stamp_ns=now_ns)
+
+    def write(self, command: ArmCommand, state: ArmState, *, now_ns: int) -> Verdict | None:
+        """Send a command, or refuse it and latch. None means it passed and was sent."""
+        refusal = self._latched or self._check(command, state, now_ns)
+        if refusal is not None:
+            return self._refuse(refusal, stamp_ns=now_ns)
+        self._q_rad = command.q_rad
+        self._sequence = command.sequence
+        self._arm.write(command)
+        return None
+
+    def latch(self, reason: Reason, detail: str, *, now_ns: int) -> Verdict:
+        """Latch for a reason found outside, such as a measurement that did not come."""
+        return self._refuse(Refusal(reason, detail), stamp_ns=now_ns)
+
+    def _check(self, command: ArmCommand, state: ArmState, now_ns: int) -> Refusal | None:
+        """Run the checks in their order. Geometry is not asked of a command that holds still."""
+        limits = self._limits
+        refusal = (
+            check_finite(command)
+            or check_sequence(command, self._sequence)
+            or check_state(state, command, now_ns, limits)
+            or check_force(state, limits)
+            or check_grip(command, limits)
+            or check_outputs(command, limits)
+        )
+        if refusal is not None:
+            return refusal
+        q = command.q_rad
+        if q != self._q_rad:
+            refusal = (
+                check_joint_range(q, limits)
+                or check_joint_speed(q, self._q_rad, limits)
+                or check_tool(q, self._chain, limits)
+                or check_intent_age(self._intent_ns, now_ns, limits)
+            )
+        return refusal or check_tracking(q, state.q_rad, limits)
+
+    def _refuse(self, refusal: Refusal, *, stamp_ns: int) -> Verdict:
+        if self._latched is None:
+            self._latched = refusal
+            self._arm.stop()
+        return Verdict(
+            stamp_ns=stamp_ns,
+            sequence=self._sequence + 1,
+            outcome=Outcome.REFUSED,
+            reason=refusal.reason.value,
+            detail=refusal.detail,
+            amount=refusal.amount,
+            is_latched=True,
+        )
