@@ -2,15 +2,19 @@
 
 import os
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
-import msgspec
 import typer
 from typer import Typer
 
 from config.errors import ConfigError
 
+if TYPE_CHECKING:
+    from sim_twin.plant import TwinPlant
+
 __all__ = ["app"]
+
+N_OUTPUTS = 16
 
 app = Typer(no_args_is_help=True, help="Look at the simulated table: a picture, or its model as MJCF.")
 
@@ -55,17 +59,39 @@ def model(
     rig: RigOption = "twin",
 ) -> None:
     """Write the table's model as MJCF, to open in any MuJoCo viewer."""
-    from config.loader import load_arm, load_rig, load_scenario
+    from config.loader import resolve
     from sim_twin.scene import build_scene
 
     try:
-        rig_config = load_rig(rig)
-        spec = build_scene(
-            load_arm(rig_config.arm), load_scenario(scenario), physics_s=rig_config.physics_s, tick_s=rig_config.tick_s
-        )
+        resolved = resolve(rig=rig, scenario=scenario)
     except ConfigError as error:
         typer.echo(str(error), err=True)
         raise typer.Exit(2) from None
+    times = resolved.rig
+    spec = build_scene(resolved.arm, resolved.scenario, physics_s=times.physics_s, tick_s=times.tick_s)
     spec.compile()
     out.write_text(spec.to_xml(), encoding="utf-8")
     typer.echo(f"wrote {out}")
+
+
+def _make_plant(scenario: str, rig: str) -> "TwinPlant":
+    from config.loader import resolve
+    from sim_twin.plant import TwinPlant
+
+    try:
+        resolved = resolve(rig=rig, scenario=scenario)
+    except ConfigError as error:
+        typer.echo(str(error), err=True)
+        raise typer.Exit(2) from None
+    return TwinPlant(arm=resolved.arm, scenario=resolved.scenario, rig=resolved.rig)
+
+
+def _bits(outputs: str) -> int:
+    """Return output numbers as bits."""
+    try:
+        numbers = [int(n) for n in outputs.split(",") if n.strip()]
+    except ValueError:
+        numbers = [-1]
+    if not all(0 <= n < N_OUTPUTS for n in numbers):
+        raise typer.BadParameter(f"expected numbers 0..{N_OUTPUTS - 1} with commas, got {outputs!r}")
+    return sum(1 << n for n in set(numbers))

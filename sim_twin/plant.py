@@ -1,6 +1,6 @@
 """The twin: the Plant door in front of MuJoCo, in lock-step."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 
 import mujoco
 import numpy as np
@@ -11,7 +11,7 @@ from config.rig import Rig
 from config.scenario import Scenario
 from robot.clock import LockStepClock
 from robot.errors import NotEngagedError, StaleStateError
-from robot.hal.protocols import Camera
+from robot.hal.protocols import Arm, Camera, Clock, Resetter, SceneTruth
 from robot.kinematics import Kinematics
 from robot.messages import (
     ArmCommand,
@@ -50,6 +50,7 @@ class TwinWorld:
         self.data = mujoco.MjData(self.model)
         self.table = TableDrive(self.model, scenario, tick_s=rig.tick_s)
         self.n_substeps = round(rig.tick_s / rig.physics_s)
+        self.step_physics = mujoco.mj_step  # a bench puts a stopwatch here
         self.clock = LockStepClock(tick_s=rig.tick_s, advance=self.advance)
         self.digital_out = 0
         self.opening_asked_m = arm.tool.stroke_m
@@ -68,7 +69,7 @@ class TwinWorld:
         if self.stop_speed_rad_s is not None:
             self._ramp_down(self.stop_speed_rad_s)
         self.table.drive(self.data, self.digital_out)
-        mujoco.mj_step(self.model, self.data, self.n_substeps)
+        self.step_physics(self.model, self.data, self.n_substeps)
 
     def begin_stop(self) -> None:
         """Let the set-points run out at a stop's deceleration from the speed that the joints have now."""
@@ -121,7 +122,7 @@ class TwinArm:
 
     def __init__(self, world: TwinWorld) -> None:
         self._world = world
-        self.clock = world.clock
+        self.clock: Clock = world.clock
         joints = world.arm.joints
         self.spec = ArmSpec(
             model=world.arm.name,
@@ -251,10 +252,10 @@ class TwinPlant:
     def __init__(self, *, arm: ArmConfig, scenario: Scenario, rig: Rig) -> None:
         self._world = TwinWorld(arm, scenario, rig)
         self.identity = PlantIdentity(kind=PlantKind.TWIN, model=arm.name, serial="twin")
-        self.arm = TwinArm(self._world)
-        self.cameras: dict[str, Camera] = {}
-        self.truth = TwinTruth(self._world)
-        self.resetter = TwinResetter(self._world, Kinematics(arm))
+        self.arm: Arm = TwinArm(self._world)
+        self.cameras: Mapping[str, Camera] = {}
+        self.truth: SceneTruth | None = TwinTruth(self._world)
+        self.resetter: Resetter = TwinResetter(self._world, Kinematics(arm))
         self._world.put(draw_layout(scenario, np.random.default_rng(0)), arm.home_rad, digital_out=0)
 
     @property

@@ -146,8 +146,9 @@ def _add_box(spec: mujoco.MjSpec, box: Box, table_m: float) -> None:
     leaf = lx / 2 + w / 2
     for name, sign in zip(leaf_names(box), (-1, 1), strict=True):
         hinge = body.add_body(name=name, pos=[sign * leaf, 0, h + LEAF_THICKNESS_M / 2])
+        span = [-0.02, box.lid.open_angle_rad + 0.05]
         hinge.add_joint(
-            name=name, type=mujoco.mjtJoint.mjJNT_HINGE, axis=[0, sign, 0], range=[-0.02, box.lid.open_angle_rad + 0.05],
+            name=name, type=mujoco.mjtJoint.mjJNT_HINGE, axis=[0, sign, 0], range=span,
             limited=mujoco.mjtLimited.mjLIMITED_TRUE, damping=0.02, armature=0.0005,
         )  # fmt: skip
         hinge.add_geom(
