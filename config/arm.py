@@ -9,6 +9,9 @@ from config.values import Angle, Length, Mass, Name, NonNegative, Point, Positiv
 __all__ = ["ArmConfig", "Capsule", "Joint", "MotionLimits", "Servo", "Tool"]
 
 
+PadSize = Annotated[float, Meta(ge=0.005, le=0.1)]
+
+
 class Joint(Section, frozen=True, kw_only=True):
     """One row of the Denavit-Hartenberg table (standard convention, as UR publishes it) and its limits."""
 
@@ -57,7 +60,7 @@ class Tool(Section, frozen=True, kw_only=True):
     grip_force_n: Positive
     """Force used when closing."""
     speed_m_s: tuple[Positive, Positive]
-    pad_size_m: tuple[Span, Span, Span]
+    pad_size_m: tuple[PadSize, PadSize, PadSize]
     """Full size of a pad: along the jaws, across, along the approach axis."""
     finger_depth_m: Span
     """Free finger length above the tool centre point before the palm begins."""

@@ -16,6 +16,8 @@ __all__ = ["RESERVED_NAMES", "check_arm", "check_learning", "check_rig", "check_
 
 RESERVED_NAMES = ("table", "gripper", "hand", "tool", "world")
 """Names that mean something by themselves in distances, rules or the simulated world."""
+CAP_M = 0.015
+"""Height of a button's cap and of the ring that holds it."""
 
 
 class _Checker:
@@ -73,6 +75,13 @@ def _check_tool(arm: ArmConfig, checker: _Checker) -> None:
         "tool.grip_force_n",
         f"a force from {low:g} to {high:g}",
         f"{tool.grip_force_n:g}",
+    )
+    tall_m = tool.pad_size_m[2]
+    checker.need(
+        tall_m <= tool.finger_depth_m,
+        "tool.pad_size_m[2]",
+        f"at most finger_depth_m = {tool.finger_depth_m:g}",
+        f"{tall_m:g}",
     )
     reach_m = tool.tcp_m[2] - tool.finger_depth_m
     checker.need(
@@ -149,6 +158,10 @@ def check_scenario(scenario: Scenario, file: str) -> None:
     for i, cylinder in enumerate(scenario.cylinders):
         _check_cylinder(cylinder, boxes, f"cylinders[{i}]", checker)
     _check_distances(scenario, checker)
+    for i, button in enumerate(scenario.buttons):
+        least_m = button.travel_m + CAP_M
+        is_high = button.height_m >= least_m
+        checker.need(is_high, f"buttons[{i}].height_m", f"at least {least_m:g}, cap and travel", f"{button.height_m:g}")
     for i, goal in enumerate(scenario.goals):
         _check_goal(goal, scenario, f"goals[{i}]", checker)
     starts = [span.from_epoch for span in scenario.schedule]

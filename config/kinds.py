@@ -70,7 +70,9 @@ def kind_of(path: Path) -> Kind:
     most = max(n_keys.values())
     best = [kind for kind, n in n_keys.items() if n == most]
     if most == 0 or len(best) > 1:
-        raise ConfigError(source.file, "", "keys that tell the kind of file, or --kind", f"{', '.join(tree) or 'none'}")
+        raise ConfigError(
+            source.file, "", "keys that tell the kind of file, or --kind", ", ".join(map(shown, tree)) or "none"
+        )
     return best[0]
 
 

@@ -188,7 +188,10 @@ def _check_together(resolved: Resolved, files: _Files) -> None:
     rig, arm = resolved.rig, resolved.arm
     if rig.expected.model != arm.name:
         raise ConfigError(
-            files.rig, "expected.model", f"{arm.name}, the model that the arm's file describes", rig.expected.model
+            files.rig,
+            "expected.model",
+            f"{arm.name}, the model that the arm's file describes",
+            repr(rig.expected.model),
         )
     n_ticks = arm.motion.step_s / rig.tick_s
     if n_ticks < 0.5 or abs(n_ticks - round(n_ticks)) > WHOLE_TICKS:

@@ -56,8 +56,6 @@ def read_path(path: Path) -> Source:
         with path.open("rb") as stream:
             content = stream.read(MAX_BYTES + 1)
     except (OSError, ValueError) as error:
-        if isinstance(error, ConfigError):
-            raise
         raise ConfigError(file, "", "a file that can be read", _reason(error)) from error
     return Source(file=file, folder=path.parent, text=_text(content, file))
 

@@ -180,7 +180,8 @@ class _Dumper(yaml.SafeDumper):
 
 def _quote(dumper: _Dumper, text: str) -> yaml.ScalarNode:
     ambiguous = not isinstance(_plain(text), str) or NOT_FINITE.fullmatch(text) is not None
-    return dumper.represent_scalar("tag:yaml.org,2002:str", text, style="'" if ambiguous else None)
+    style = "'" if ambiguous else None if text.isprintable() else '"'
+    return dumper.represent_scalar("tag:yaml.org,2002:str", text, style=style)
 
 
 _Dumper.add_representer(str, _quote)
