@@ -144,7 +144,7 @@ class CheckpointStore:
         self._folder.mkdir(parents=True, exist_ok=True)
         path = self._folder / f"checkpoint-{epoch:08d}.zip"
         write_atomically(path, raw)
-        for old in self._paths()[self._keep :]:
+        for old in (*self._paths()[self._keep :], *self._folder.glob("*.tmp")):
             old.unlink(missing_ok=True)
         return path
 

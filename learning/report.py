@@ -1,0 +1,183 @@
+"""Runs read back from their folders and put side by side: figures of merit over seeds, grouped by learner. Pure."""
+
+import math
+from collections.abc import Callable, Sequence
+from statistics import median
+
+import msgspec
+
+from learning.errors import RunFolderError
+from learning.metrics import EraSummary, Summary, summarise
+from learning.rows import EvaluationRow, GoalRow
+from learning.run_folder import Manifest, RunFolder
+
+__all__ = [
+    "Count",
+    "EraReport",
+    "Group",
+    "GroupReport",
+    "Report",
+    "Run",
+    "Spread",
+    "group_runs",
+    "load_run",
+    "report_of",
+]
+
+Z_95 = 1.959964
+
+
+class Run(msgspec.Struct, frozen=True, kw_only=True):
+    """One run as its folder tells it."""
+
+    folder: str
+    manifest: Manifest
+    goal_rows: tuple[GoalRow, ...]
+    evaluation_rows: tuple[EvaluationRow, ...]
+    summary: Summary
+
+
+class Group(msgspec.Struct, frozen=True, kw_only=True):
+    """Runs of one learner on one scenario; they differ by seed."""
+
+    name: str
+    runs: tuple[Run, ...]
+
+
+class Count(msgspec.Struct, frozen=True, kw_only=True):
+    """So many of so many runs, with the 95 % interval of the share behind it."""
+
+    n: int
+    of: int
+    share_low: float
+    share_high: float
+
+
+class Spread(msgspec.Struct, frozen=True, kw_only=True):
+    """Median and range over the runs that have a figure."""
+
+    median: float
+    least: float
+    greatest: float
+    of: int
+
+
+class EraReport(msgspec.Struct, frozen=True, kw_only=True):
+    """One set of rules over all runs of a group."""
+
+    from_epoch: int
+    learnt: Count
+    learnt_after: Spread | None
+    graph_right: Count
+    graph_right_after: Spread | None
+    trials_over_optimum: Spread | None
+    trials_over_optimum_with_failures: Spread | None
+    success: Spread | None
+    """Of the least successful goal over an era's last 200 epochs."""
+
+
+class GroupReport(msgspec.Struct, frozen=True, kw_only=True):
+    """All runs of one learner."""
+
+    name: str
+    seeds: tuple[int, ...]
+    eras: tuple[EraReport, ...]
+
+
+class Report(msgspec.Struct, frozen=True, kw_only=True):
+    """What `autotelic report` writes."""
+
+    groups: tuple[GroupReport, ...]
+    runs: tuple[tuple[str, Summary], ...]
+    """Folder and figures of each run."""
+
+
+def load_run(folder: RunFolder) -> Run:
+    """Return a run, finished or not.
+
+    Raises:
+        RunFolderError: the folder or one of its tables cannot be read.
+    """
+    manifest = folder.manifest()
+    goal_rows, evaluation_rows = folder.goals(), folder.evaluations()
+    summary = summarise(
+        goal_rows,
+        evaluation_rows,
+        n_goals=len(manifest.goals),
+        changes=manifest.changes,
+        optima=manifest.optima,
+    )
+    return Run(
+        folder=str(folder.path),
+        manifest=manifest,
+        goal_rows=tuple(goal_rows),
+        evaluation_rows=tuple(evaluation_rows),
+        summary=summary,
+    )
+
+
+def group_runs(runs: Sequence[Run]) -> list[Group]:
+    """Return the runs grouped by learner (and scenario where there is more than one), in the order they came.
+
+    Raises:
+        RunFolderError: runs of one group have other goals or other changes of rules.
+    """
+    scenarios = {run.manifest.scenario for run in runs}
+    by_name: dict[str, list[Run]] = {}
+    for run in runs:
+        of_scenario = f", {run.manifest.scenario}" if len(scenarios) > 1 else ""
+        by_name.setdefault(run.manifest.learner + of_scenario, []).append(run)
+    for name, members in by_name.items():
+        first = members[0].manifest
+        for run in members[1:]:
+            if (run.manifest.goals, run.manifest.changes) != (first.goals, first.changes):
+                raise RunFolderError(f"{run.folder}: expected the goals and changes of {members[0].folder} ({name})")
+    return [Group(name=name, runs=tuple(members)) for name, members in by_name.items()]
+
+
+def report_of(groups: Sequence[Group]) -> Report:
+    """Return the figures of all groups."""
+    return Report(
+        groups=tuple(_report_group(group) for group in groups),
+        runs=tuple((run.folder, run.summary) for group in groups for run in group.runs),
+    )
+
+
+def _report_group(group: Group) -> GroupReport:
+    n_eras = max(len(run.summary.eras) for run in group.runs)
+    eras = [[run.summary.eras[i] for run in group.runs if i < len(run.summary.eras)] for i in range(n_eras)]
+    return GroupReport(
+        name=group.name,
+        seeds=tuple(run.manifest.seed for run in group.runs),
+        eras=tuple(_report_era(parts) for parts in eras),
+    )
+
+
+def _report_era(parts: Sequence[EraSummary]) -> EraReport:
+    return EraReport(
+        from_epoch=parts[0].from_epoch,
+        learnt=count(sum(part.learnt_after is not None for part in parts), len(parts)),
+        learnt_after=_spread(parts, lambda part: part.learnt_after),
+        graph_right=count(sum(part.graph_right_after is not None for part in parts), len(parts)),
+        graph_right_after=_spread(parts, lambda part: part.graph_right_after),
+        trials_over_optimum=_spread(parts, lambda part: part.trials_over_optimum),
+        trials_over_optimum_with_failures=_spread(parts, lambda part: part.trials_over_optimum_with_failures),
+        success=_spread(parts, lambda part: min((s for s in part.success_by_goal if s is not None), default=None)),
+    )
+
+
+def _spread(parts: Sequence[EraSummary], figure: Callable[[EraSummary], float | None]) -> Spread | None:
+    values = [value for part in parts if (value := figure(part)) is not None]
+    if not values:
+        return None
+    return Spread(median=median(values), least=min(values), greatest=max(values), of=len(values))
+
+
+def count(n: int, of: int) -> Count:
+    """Return a count with Wilson's 95 % interval of its share."""
+    if of == 0:
+        return Count(n=0, of=0, share_low=0.0, share_high=1.0)
+    share, z2 = n / of, Z_95**2
+    centre = (share + z2 / (2 * of)) / (1 + z2 / of)
+    half = Z_95 / (1 + z2 / of) * math.sqrt(share * (1 - share) / of + z2 / (4 * of**2))
+    return Count(n=n, of=of, share_low=max(0.0, centre - half), share_high=min(1.0, centre + half))

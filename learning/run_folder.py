@@ -1,0 +1,156 @@
+"""A run's folder: what was run, with what, and where its figures lie. One process at a time may write to it."""
+
+import fcntl
+from pathlib import Path
+from types import TracebackType
+from typing import IO, Self
+
+import msgspec
+
+from learning.checkpoint import CheckpointStore, write_atomically
+from learning.errors import RunFolderError
+from learning.rows import EvaluationRow, GoalRow, TrialRow, read_rows
+
+__all__ = ["FORMAT", "GoalInfo", "Manifest", "RunFolder"]
+
+FORMAT = 1
+
+
+class GoalInfo(msgspec.Struct, frozen=True, kw_only=True):
+    """A goal as figures and tables show it."""
+
+    name: str
+    kind: str
+    colour: tuple[float, float, float]
+    """Of the goal's object."""
+
+
+class Manifest(msgspec.Struct, frozen=True, kw_only=True):
+    """What a run is made of, beside its config."""
+
+    format: int = FORMAT
+    seed: int
+    learner: str
+    scenario: str
+    rig: str
+    n_epochs: int
+    n_trials: int
+    """Trials that an epoch has."""
+    changes: tuple[int, ...]
+    """Epochs at which the rules change."""
+    goals: tuple[GoalInfo, ...]
+    optima: tuple[tuple[int | None, ...], ...]
+    """Least trials of each goal, for each era between changes."""
+    config_sha256: str
+    plant: str
+    model_sha256: str | None
+    """Digest of the plant's model, None where it has none."""
+    git: str | None
+    versions: dict[str, str]
+    machine: dict[str, str | int]
+
+
+class RunFolder:
+    """The folder of one run, for reading; `write` makes it this process's own."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.checkpoints = CheckpointStore(path / "checkpoints")
+        self._lock: IO[str] | None = None
+
+    # --------------------------------------------------------------------------------------------------------- read
+
+    @property
+    def config_path(self) -> Path:
+        """The resolved config."""
+        return self.path / "config.yaml"
+
+    @property
+    def figures(self) -> Path:
+        """Folder of the figures."""
+        return self.path / "figures"
+
+    def holds_run(self) -> bool:
+        """Whether a run was started here."""
+        return (self.path / "run.json").is_file()
+
+    def manifest(self) -> Manifest:
+        """Return what was run.
+
+        Raises:
+            RunFolderError: this is no run folder, or one of another format.
+        """
+        path = self.path / "run.json"
+        try:
+            manifest = msgspec.json.decode(path.read_bytes(), type=Manifest)
+        except OSError as error:
+            message = f"{self.path}: expected a run folder, found no run.json in it ({error.strerror})"
+            raise RunFolderError(message) from error
+        except msgspec.DecodeError as error:
+            message = f"{path}: {error}"
+            raise RunFolderError(message) from error
+        if manifest.format != FORMAT:
+            raise RunFolderError(f"{path}: expected format {FORMAT}, got {manifest.format}")
+        return manifest
+
+    def trials(self) -> list[TrialRow]:
+        """Return one row a trial."""
+        return read_rows(self.path / "trials.csv", TrialRow)
+
+    def goals(self) -> list[GoalRow]:
+        """Return one row a goal choice."""
+        return read_rows(self.path / "goals.csv", GoalRow)
+
+    def evaluations(self) -> list[EvaluationRow]:
+        """Return one row an evaluation and goal."""
+        return read_rows(self.path / "evaluations.csv", EvaluationRow)
+
+    # -------------------------------------------------------------------------------------------------------- write
+
+    def start(self, manifest: Manifest, config: str) -> None:
+        """Make the folder and write what is to be run.
+
+        Raises:
+            RunFolderError: the folder holds a run already, or something else.
+        """
+        if self.holds_run():
+            raise RunFolderError(
+                f"{self.path} holds a run already: go on with it by --resume, or name another folder by --out"
+            )
+        foreign = sorted(entry.name for entry in self.path.iterdir() if not self._is_ours(entry, config))
+        if foreign:
+            raise RunFolderError(f"{self.path}: expected an empty or new folder, found {foreign[0]} in it")
+        write_atomically(self.config_path, config.encode())
+        self.write_json("run.json", manifest)
+
+    def _is_ours(self, entry: Path, config: str) -> bool:
+        """Whether a file is what a start that was killed half-way leaves behind."""
+        is_config = entry == self.config_path and entry.read_bytes() == config.encode()
+        return is_config or entry.name == "lock" or entry.suffix == ".tmp"
+
+    def write_json(self, name: str, value: msgspec.Struct | dict[str, object]) -> None:
+        """Write one JSON file, indented."""
+        write_atomically(self.path / name, msgspec.json.format(msgspec.json.encode(value), indent=2) + b"\n")
+
+    def __enter__(self) -> Self:
+        """Take the folder for this process.
+
+        Raises:
+            RunFolderError: another process has it, or it cannot be made.
+        """
+        try:
+            self.path.mkdir(parents=True, exist_ok=True)
+            self._lock = (self.path / "lock").open("w")
+            fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError as error:
+            message = f"{self.path} is in use by another process: wait for it, or name another folder by --out"
+            raise RunFolderError(message) from error
+        except OSError as error:
+            message = f"{self.path}: expected a folder that can be written to, {(error.strerror or str(error)).lower()}"
+            raise RunFolderError(message) from error
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
+        if self._lock is not None:
+            self._lock.close()
+            self._lock = None
