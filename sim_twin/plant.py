@@ -87,10 +87,11 @@ class TwinWorld:
     def put(self, layout: Layout, q_rad: tuple[float, ...], digital_out: int) -> None:
         """Place everything (a reset): the only teleport there is."""
         model, data, tool = self.model, self.data, self.arm.tool
-        mujoco.mj_resetData(model, data)
-        self.stop_speed_rad_s = None
         for name, (x, y) in layout.fixtures_m.items():
             model.body(name).pos[:2] = (x, y)
+        # With sleeping on, what cannot move is placed by the reset and never again: move fixtures before it.
+        mujoco.mj_resetData(model, data)
+        self.stop_speed_rad_s = None
         for cylinder in self.scenario.cylinders:
             standing = layout.cylinders[cylinder.name]
             address = int(model.joint(cylinder.name).qposadr[0])
