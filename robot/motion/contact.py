@@ -70,11 +70,12 @@ class ContactGuard:
             self._held = None
         fx, fy, fz = force_n
         x, y, z = target_m
-        if fz > self._force_n and z < measured_m[2]:
-            if self._held is None:
-                self._held = (x, y, measured_m[2])
+        is_pushed_up = fz > self._force_n and z < measured_m[2]
+        if is_pushed_up:
             z = measured_m[2]
         if math.hypot(fx, fy) > self._force_n and (x - measured_m[0]) * fx + (y - measured_m[1]) * fy < 0.0:
             x, y = measured_m[0], measured_m[1]
+        if is_pushed_up and self._held is None:
+            self._held = (x, y, z)
         moved = (x, y, z)
         return None if moved == target_m else moved

@@ -69,14 +69,19 @@ class Mover:
         self._follower.brake()
 
     def tick(self, state: ArmState) -> Vec6:
-        """Return the joints to command for this tick, eased by the measured force."""
+        """Return the joints to command for this tick, eased by the measured force.
+
+        Where the force says stop, the command falls back to the measured joints at once: they trail it by a lag that
+        would go on pressing.
+        """
         follower = self._follower
         moved = self._contact.reseat(state.tcp_force_n, state.tcp_position_m, follower.target_m)
         if moved is not None:
             self._limiters.append("contact")
-            yaw = follower.yaw_rad
-            follower.seed(self._back_to(state.q_rad))
+            yaw, back = follower.yaw_rad, self._back_to(state.q_rad)
+            follower.seed(back)
             follower.aim(moved, yaw)
+            return back
         q = follower.step()
         if follower.trouble is not None:
             self._limiters.append(follower.trouble)

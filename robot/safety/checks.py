@@ -195,13 +195,17 @@ def check_tracking(q_rad: Vec6, measured_rad: Vec6, limits: GateLimits) -> Refus
     return None
 
 
-def check_force(state: ArmState, limits: GateLimits) -> Refusal | None:
-    """Refuse when the tool is pushed too hard, or the force is not finite."""
-    force = math.hypot(*state.tcp_force_n)
-    if force <= limits.force_max_n:
+def check_force(force_n: float, force_before_n: float, limits: GateLimits) -> Refusal | None:
+    """Refuse when the tool is pushed too hard for longer than a tick, at once at the limit for impacts, or by NaN.
+
+    The force guard of motion needs one tick to give way, so that a blow may exceed the limit for steady force once.
+    """
+    if force_n <= limits.force_max_n:
         return None
-    detail = f"expected at most {limits.force_max_n:g} N on the tool, came {force:g}"
-    return Refusal(Reason.FORCE, detail, force - limits.force_max_n)
+    if force_n <= limits.impact_max_n and force_before_n <= limits.force_max_n:
+        return None
+    detail = f"expected at most {limits.force_max_n:g} N on the tool ({limits.impact_max_n:g} in a blow), came {force_n:g}"
+    return Refusal(Reason.FORCE, detail, force_n - limits.force_max_n)
 
 
 def check_grip(command: ArmCommand, limits: GateLimits) -> Refusal | None:

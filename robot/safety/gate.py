@@ -1,5 +1,7 @@
 """The safety gate: the only caller of Arm.write. It passes or refuses; a refusal latches."""
 
+import math
+
 from robot.hal.protocols import Arm
 from robot.kinematics import ToolChain
 from robot.messages import ArmCommand, ArmState, Outcome, Verdict
@@ -34,6 +36,7 @@ class Gate:
     def __init__(self, *, arm: Arm, limits: GateLimits, chain: ToolChain) -> None:
         self._arm, self._limits, self._chain = arm, limits, chain
         self._sequence = 0
+        self._force_before_n = 0.0
         self._q_rad = (0.0,) * 6
         self._intent_ns = 0
         self._latched: Refusal | None = None
@@ -57,6 +60,7 @@ class Gate:
         """Start from the measured joints at rest, latch cleared. For the station, after arming or a reset only."""
         self._q_rad = state.q_rad
         self._sequence = 0
+        self._force_before_n = 0.0
         self._intent_ns = state.stamp_ns
         self._latched = None
 
@@ -85,16 +89,18 @@ class Gate:
     def _check(self, command: ArmCommand, state: ArmState, now_ns: int) -> Refusal | None:
         """Run the checks in their order. Geometry is not asked of a command that holds still."""
         limits = self._limits
+        force_n = math.hypot(*state.tcp_force_n)
         refusal = (
             check_finite(command)
             or check_sequence(command, self._sequence)
             or check_state(state, command, now_ns, limits)
-            or check_force(state, limits)
+            or check_force(force_n, self._force_before_n, limits)
             or check_grip(command, limits)
             or check_outputs(command, limits)
         )
         if refusal is not None:
             return refusal
+        self._force_before_n = force_n
         q = command.q_rad
         if q != self._q_rad:
             refusal = (
