@@ -1,5 +1,6 @@
 """The twin: the Plant door in front of MuJoCo, in lock-step."""
 
+import hashlib
 from collections.abc import Iterable, Mapping
 
 import mujoco
@@ -47,8 +48,9 @@ class TwinWorld:
     def __init__(self, arm: ArmConfig, scenario: Scenario, rig: Rig) -> None:
         self.arm, self.scenario, self.tick_s = arm, scenario, rig.tick_s
         self.model = build_scene(arm, scenario, physics_s=rig.physics_s, tick_s=rig.tick_s).compile()
+        self.model_sha256 = _digest(self.model)
         self.data = mujoco.MjData(self.model)
-        self.table = TableDrive(self.model, scenario, tick_s=rig.tick_s)
+        self.table = TableDrive(self.model, self.data, scenario, tick_s=rig.tick_s)
         self.n_substeps = round(rig.tick_s / rig.physics_s)
         self.step_physics = mujoco.mj_step  # a bench puts a stopwatch here
         self.clock = LockStepClock(tick_s=rig.tick_s, advance=self.advance)
@@ -57,6 +59,7 @@ class TwinWorld:
         self.opening_goal_m = arm.tool.stroke_m
         self.grip_speed_m_s = arm.tool.speed_m_s[1]
         self.grip_control = self.model.actuator("grip").id
+        self.grip_set_point = self.data.ctrl[self.grip_control : self.grip_control + 1]
         self.stop_speed_rad_s: Array | None = None
         self.joint_controls = np.array([self.model.actuator(j.name).id for j in arm.joints])
         self.finger_addresses = [int(self.model.joint(f"finger_{s}").qposadr[0]) for s in ("left", "right")]
@@ -65,7 +68,7 @@ class TwinWorld:
         """One tick: drives, then physics."""
         step = self.grip_speed_m_s * self.tick_s
         self.opening_asked_m += min(max(self.opening_goal_m - self.opening_asked_m, -step), step)
-        self.data.ctrl[self.grip_control] = self.opening_asked_m
+        self.grip_set_point[0] = self.opening_asked_m
         if self.stop_speed_rad_s is not None:
             self._ramp_down(self.stop_speed_rad_s)
         self.table.drive(self.data, self.digital_out)
@@ -145,6 +148,9 @@ class TwinArm:
         self._fingers = [data.qpos[a : a + 1] for a in world.finger_addresses]
         self._finger_speeds = [data.qvel[int(model.joint(f"finger_{s}").dofadr[0]) :][:1] for s in ("left", "right")]
         self._has_object = False
+        first = int(world.joint_controls[0])
+        self._joint_controls = data.ctrl[first : first + 6]
+        self._grip_force_n = 0.0
 
     def connect(self) -> None:
         """Take the arm; nothing moves."""
@@ -164,7 +170,7 @@ class TwinArm:
             tcp_quat=_quat(self._tcp_body),
             tcp_force_n=(0.0 - fx, 0.0 - fy, 0.0 - fz),
             grip=self._read_grip(),
-            digital_in=world.table.read_inputs(world.data),
+            digital_in=world.table.read_inputs(),
             digital_out=world.digital_out,
             mode=ArmMode.RUNNING,
         )
@@ -172,8 +178,8 @@ class TwinArm:
     def _read_grip(self) -> GripState:
         """Opening from the fingers; an object is what stalls a closing hand before its jaws meet."""
         world = self._world
-        opening = float(self._fingers[0][0] + self._fingers[1][0])
-        speed = float(self._finger_speeds[0][0] + self._finger_speeds[1][0])
+        opening = self._fingers[0].item() + self._fingers[1].item()
+        speed = self._finger_speeds[0].item() + self._finger_speeds[1].item()
         is_still = abs(speed) < STILL_M_S
         is_pressing = opening - world.opening_asked_m > HELD_GAP_M and opening > HELD_GAP_M
         # Once held, a short stir of the fingers is not a loss; meeting jaws or an opening hand is.
@@ -186,11 +192,13 @@ class TwinArm:
             raise NotEngagedError("twin arm: expected connect() before write(); nothing moved")
         world = self._world
         world.stop_speed_rad_s = None
-        world.data.ctrl[world.joint_controls] = command.q_rad
+        self._joint_controls[:] = command.q_rad
         grip = command.grip
         world.opening_goal_m = grip.opening_m
         world.grip_speed_m_s = grip.speed_m_s
-        world.model.actuator_forcerange[world.grip_control] = (-grip.force_n, grip.force_n)
+        if grip.force_n != self._grip_force_n:
+            self._grip_force_n = grip.force_n
+            world.model.actuator_forcerange[world.grip_control] = (-grip.force_n, grip.force_n)
         world.digital_out = command.digital_out
 
     def stop(self) -> bool:
@@ -263,6 +271,17 @@ class TwinPlant:
     def world(self) -> TwinWorld:
         """Model and data, for pictures and benches."""
         return self._world
+
+    @property
+    def model_sha256(self) -> str:
+        """Digest of the compiled model, before any reset moved a thing: the same files give the same."""
+        return self._world.model_sha256
+
+
+def _digest(model: mujoco.MjModel) -> str:
+    buffer = np.zeros(mujoco.mj_sizeModel(model), dtype=np.uint8)
+    mujoco.mj_saveModel(model, None, buffer)
+    return hashlib.sha256(buffer.tobytes()).hexdigest()
 
 
 def _vec6(values: Iterable[float]) -> Vec6:
