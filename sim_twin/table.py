@@ -14,16 +14,16 @@ SHUT_RAD = 0.01
 class _Switch:
     """A button's contact with hysteresis on its travel."""
 
-    def __init__(self, model: mujoco.MjModel, button: Button) -> None:
-        self._address = int(model.joint(f"{button.name}_travel").qposadr[0])
+    def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, button: Button) -> None:
+        address = int(model.joint(f"{button.name}_travel").qposadr[0])
+        self._travel_m = data.qpos[address : address + 1]
         self._closes_m, self._opens_m = CLOSES_AT * button.travel_m, OPENS_AT * button.travel_m
         self._bit = 1 << button.input
         self.is_closed = False
 
-    def read(self, data: mujoco.MjData) -> int:
+    def read(self) -> int:
         """Return the input's bit."""
-        travel = data.qpos[self._address]
-        self.is_closed = travel >= (self._opens_m if self.is_closed else self._closes_m)
+        self.is_closed = self._travel_m.item() >= (self._opens_m if self.is_closed else self._closes_m)
         return self._bit if self.is_closed else 0
 
 
@@ -40,22 +40,29 @@ class _Lid:
         self._open_rad = box.lid.open_angle_rad
         self._step_rad = box.lid.speed_rad_s * tick_s
         self._asked_rad = 0.0
+        self._was_open = False
+        self._is_settled = False
 
     def put(self, data: mujoco.MjData, digital_out: int) -> None:
         """Place the leaves where the output says (a reset)."""
-        self._asked_rad = self._open_rad if digital_out & self._bit else 0.0
+        self._was_open = bool(digital_out & self._bit)
+        self._asked_rad = self._open_rad if self._was_open else 0.0
+        self._is_settled = False
         for address in self.angle_addresses:
             data.qpos[address] = self._asked_rad
-        self._apply(data, is_open=bool(digital_out & self._bit))
+        self._apply(data, is_open=self._was_open)
 
     def drive(self, data: mujoco.MjData, digital_out: int) -> None:
         """Move the set-point by one tick and lock or free the leaves."""
         is_open = bool(digital_out & self._bit)
+        if is_open == self._was_open and self._is_settled:
+            return
+        self._was_open = is_open
         goal = self._open_rad if is_open else 0.0
-        if goal != self._asked_rad or not is_open:
-            step = min(max(goal - self._asked_rad, -self._step_rad), self._step_rad)
-            self._asked_rad += step
-            self._apply(data, is_open=is_open)
+        step = min(max(goal - self._asked_rad, -self._step_rad), self._step_rad)
+        self._asked_rad += step
+        self._apply(data, is_open=is_open)
+        self._is_settled = self._asked_rad == goal and (is_open or all(data.eq_active[lock] for lock in self._locks))
 
     def _apply(self, data: mujoco.MjData, *, is_open: bool) -> None:
         for control, lock, address in zip(self._controls, self._locks, self.angle_addresses, strict=True):
@@ -66,19 +73,19 @@ class _Lid:
 class _Presence:
     """A sensor in a box's floor that sees a cylinder standing or lying over it."""
 
-    def __init__(self, model: mujoco.MjModel, box: Box, cylinders: tuple[Cylinder, ...]) -> None:
+    def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, box: Box, cylinders: tuple[Cylinder, ...]) -> None:
         assert box.presence_input is not None
         self._bit = 1 << box.presence_input
-        self._box = model.body(box.name).id
+        self._centre_m = data.xpos[model.body(box.name).id]
         self._half = (box.inner_m[0] / 2, box.inner_m[1] / 2, box.height_m)
-        self._bodies = [model.body(c.name).id for c in cylinders]
+        self._positions_m = [data.xpos[model.body(c.name).id] for c in cylinders]
 
-    def read(self, data: mujoco.MjData) -> int:
+    def read(self) -> int:
         """Return the input's bit."""
-        bx, by, bz = data.xpos[self._box]
+        bx, by, bz = self._centre_m.tolist()
         hx, hy, h = self._half
-        for body in self._bodies:
-            x, y, z = data.xpos[body]
+        for position in self._positions_m:
+            x, y, z = position.tolist()
             if abs(x - bx) < hx and abs(y - by) < hy and z - bz < h:
                 return self._bit
         return 0
@@ -87,11 +94,11 @@ class _Presence:
 class TableDrive:
     """All of a scenario's wiring to the physics: inputs out of it, outputs into it."""
 
-    def __init__(self, model: mujoco.MjModel, scenario: Scenario, *, tick_s: float) -> None:
-        self._switches = [_Switch(model, b) for b in scenario.buttons]
+    def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, scenario: Scenario, *, tick_s: float) -> None:
+        self._switches = [_Switch(model, data, b) for b in scenario.buttons]
         self._lids = [_Lid(model, b, tick_s) for b in scenario.boxes if b.lid is not None]
         self._presences = [
-            _Presence(model, b, scenario.cylinders) for b in scenario.boxes if b.presence_input is not None
+            _Presence(model, data, b, scenario.cylinders) for b in scenario.boxes if b.presence_input is not None
         ]
 
     def put(self, data: mujoco.MjData, digital_out: int) -> None:
@@ -106,11 +113,11 @@ class TableDrive:
         for lid in self._lids:
             lid.drive(data, digital_out)
 
-    def read_inputs(self, data: mujoco.MjData) -> int:
+    def read_inputs(self) -> int:
         """Return the digital inputs as bits."""
         bits = 0
         for switch in self._switches:
-            bits |= switch.read(data)
+            bits |= switch.read()
         for presence in self._presences:
-            bits |= presence.read(data)
+            bits |= presence.read()
         return bits
