@@ -68,14 +68,22 @@ def _load(point: EntryPoint) -> Any:  # noqa: ANN401
     try:
         registered = point.load()
     except ModuleNotFoundError as error:
-        registered = _unavailable(point.name, error)
+        anything = {"ignore_unknown_options": True, "allow_extra_args": True}
+        registered = _application(point.name, _unavailable(point.name, error), context_settings=anything)
     if not isinstance(registered, typer.Typer):
-        single = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
-        single.command(name=point.name)(registered)
-        registered = single
+        registered = _application(point.name, registered)
     command = typer.main.get_command(registered)
     command.name = point.name
     return command
+
+
+def _application(
+    name: str, function: Callable[..., None], *, context_settings: dict[str, Any] | None = None
+) -> typer.Typer:
+    """Return an application of one function."""
+    single = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
+    single.command(name=name, context_settings=context_settings)(function)
+    return single
 
 
 def _unavailable(name: str, error: ModuleNotFoundError) -> Callable[[], None]:

@@ -1,0 +1,111 @@
+"""The wheel, installed in an empty folder, is all that a user needs."""
+
+import csv
+import os
+import shutil
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+
+import pytest
+
+from config.loader import load_resolved
+from config.sources import shipped_names
+
+ROOT = Path(__file__).parents[1]
+ROOMS = ("config", "learning", "perception", "robot", "sim_twin")
+FOLDERS = ("arms", "learning", "rigs", "rules", "scenarios")
+
+
+def run(*command, cwd, **environment):
+    """Run a command and return what it did; it may last two minutes."""
+    return subprocess.run(
+        [str(word) for word in command],
+        cwd=cwd,
+        env={**os.environ, **environment},
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+    )
+
+
+@pytest.fixture(scope="module")
+def wheel(tmp_path_factory):
+    """Build the wheel from a copy of the tree, so that the tree stays clean; return its path."""
+    tree = tmp_path_factory.mktemp("tree")
+    for room in (*ROOMS, "tests"):
+        shutil.copytree(ROOT / room, tree / room, ignore=shutil.ignore_patterns("__pycache__"))
+    for file in ("pyproject.toml", "README.md", "LICENSE"):
+        shutil.copy(ROOT / file, tree / file)
+    built = run(sys.executable, "-m", "build", "--wheel", "--no-isolation", "--outdir", tree / "dist", tree, cwd=tree)
+    assert built.returncode == 0, built.stdout + built.stderr
+    (path,) = (tree / "dist").glob("*.whl")
+    return path
+
+
+@pytest.fixture(scope="module")
+def call(wheel, tmp_path_factory):
+    """Install the wheel beside this environment's packages; return how to run its command in an empty folder."""
+    site = tmp_path_factory.mktemp("site")
+    pip = ("-m", "pip", "install", "--quiet", "--disable-pip-version-check", "--no-deps", "--no-index")
+    installed = run(sys.executable, *pip, "--target", site, wheel, cwd=site)
+    assert installed.returncode == 0, installed.stderr
+    empty = tmp_path_factory.mktemp("empty")
+
+    def command(*arguments, program=site / "bin" / "autotelic"):
+        return run(program, *arguments, cwd=empty, PYTHONPATH=str(site), OMP_NUM_THREADS="1")
+
+    command.site, command.folder = site, empty
+    return command
+
+
+def test_the_wheel_holds_the_rooms_their_data_and_the_licence_and_nothing_else(wheel):
+    with zipfile.ZipFile(wheel) as archive:
+        names = archive.namelist()
+    tops = {name.split("/")[0] for name in names}
+    assert {top for top in tops if not top.endswith(".dist-info")} == set(ROOMS)
+    assert not [name for name in names if "test" in name.lower() or name.endswith((".pyc", ".pyi", ".toml"))]
+    assert {name for name in names if name.endswith(".yaml")} == {
+        f"config/{folder}/{name}.yaml" for folder in FOLDERS for name in shipped_names(folder)
+    }
+    modules = {str(path.relative_to(ROOT)) for room in ROOMS for path in (ROOT / room).rglob("*.py")}
+    assert {name for name in names if name.endswith(".py")} == modules
+    assert any(name.endswith("licenses/LICENSE") for name in names)
+
+
+def test_the_installed_packages_are_the_wheels(call):
+    script = f"import {', '.join(ROOMS)}; print(*({', '.join(f'{room}.__file__' for room in ROOMS)},), sep='\\n')"
+    result = call("-c", script, program=sys.executable)
+    assert result.returncode == 0, result.stderr
+    assert all(Path(line).is_relative_to(call.site) for line in result.stdout.split())
+
+
+def test_the_shipped_configs_are_found_and_right(call):
+    result = call("config", "check")
+    assert result.returncode == 0, result.stderr
+    assert result.stdout.count("ok: ") == sum(len(shipped_names(folder)) for folder in FOLDERS)
+
+
+def test_a_few_epochs_of_learning_leave_a_run_folder(call):
+    arguments = (
+        "--scenario",
+        "paper",
+        "--rig",
+        "twin",
+        "--preset",
+        "default",
+        "--seed",
+        "3",
+        "--epochs",
+        "2",
+        "--out",
+        "out",
+    )
+    result = call("learn", *arguments)
+    assert result.returncode == 0, result.stdout + result.stderr
+    out = call.folder / "out"
+    assert load_resolved(out / "config.yaml").scenario.name == "paper"
+    with (out / "trials.csv").open(encoding="utf-8", newline="") as stream:
+        assert {row["epoch"] for row in csv.DictReader(stream)} == {"0", "1"}
