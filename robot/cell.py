@@ -137,7 +137,9 @@ class Cell:
         conditions = []
         for rule in rules.rules:
             if rule.output not in self._output_bits:
-                raise RobotConfigError(f"rules {rules.name}: expected one of {list(self._output_bits)}, came {rule.output}")
+                raise RobotConfigError(
+                    f"rules {rules.name}: expected one of {list(self._output_bits)}, came {rule.output}"
+                )
             on = off = 0
             for literal in rule.when:
                 if literal.input not in self._input_bits:
@@ -150,7 +152,7 @@ class Cell:
 
 
 def _sweep(box: Box, scenario: Scenario, arm: ArmConfig) -> _Sweep:
-    """Return the tool centre points at which the tool could touch a lid's leaves on their way, wherever the box is drawn.
+    """Return where the tool could touch a lid's leaves on their way, wherever the box is drawn.
 
     A leaf spans half the box; opened past upright it leans out by -cos(angle) of its length.
     """

@@ -65,7 +65,9 @@ class LocalStation:
         rig: Rig,
     ) -> None:
         if abs(plant.arm.spec.rate_hz * rig.tick_s - 1.0) > WHOLE_TICKS:
-            raise RobotConfigError(f"rig {rig.name}: tick {rig.tick_s} s, the plant's is {1 / plant.arm.spec.rate_hz} s")
+            raise RobotConfigError(
+                f"rig {rig.name}: tick {rig.tick_s} s, the plant's is {1 / plant.arm.spec.rate_hz} s"
+            )
         table_m = scenario.table.height_m
         self._plant, self._perception, self._rig = plant, perception, rig
         self._cell = Cell(scenario=scenario, rule_sets=rule_sets, arm=arm)

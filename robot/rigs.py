@@ -25,7 +25,9 @@ def load(import_string: str) -> Any:  # noqa: ANN401 - what a string names is kn
     try:
         return getattr(import_module(module), name)
     except (ImportError, AttributeError) as error:
-        raise RobotConfigError(f"expected an import string module:Name that exists, came {import_string!r}: {error}") from error
+        raise RobotConfigError(
+            f"expected an import string module:Name that exists, came {import_string!r}: {error}"
+        ) from error
 
 
 def build_plant(*, rig: Rig, arm: ArmConfig, scenario: Scenario) -> Plant:

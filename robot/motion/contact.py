@@ -19,11 +19,13 @@ class ContactGuard:
     """Decides from the measured force where the target may not go on.
 
     Held up stays true from the first push until the tool is lifted, slides away or sinks, so that a percept between
-    two pushes does not read as free.
+    two pushes does not read as free. Sideways a push counts when it lasts two ticks: the jaws' own forces on what they
+    hold do not cancel at every instant.
     """
 
     def __init__(self, arm: ArmConfig) -> None:
         self._force_n = arm.motion.contact_force_n
+        self._was_pushed_back = False
         self._held: Vec3 | None = None
         """Where the target was in the plane, and the tool in height, when the tool was held up."""
 
@@ -35,6 +37,7 @@ class ContactGuard:
     def reset(self) -> None:
         """Forget any contact."""
         self._held = None
+        self._was_pushed_back = False
 
     def ease(self, at_m: Vec3, wanted_m: Vec3) -> tuple[Vec3, bool]:
         """Let a step push on only a little while the tool is held up.
@@ -73,8 +76,10 @@ class ContactGuard:
         is_pushed_up = fz > self._force_n and z < measured_m[2]
         if is_pushed_up:
             z = measured_m[2]
-        if math.hypot(fx, fy) > self._force_n and (x - measured_m[0]) * fx + (y - measured_m[1]) * fy < 0.0:
+        is_pushed_back = math.hypot(fx, fy) > self._force_n
+        if is_pushed_back and self._was_pushed_back and (x - measured_m[0]) * fx + (y - measured_m[1]) * fy < 0.0:
             x, y = measured_m[0], measured_m[1]
+        self._was_pushed_back = is_pushed_back
         if is_pushed_up and self._held is None:
             self._held = (x, y, z)
         moved = (x, y, z)

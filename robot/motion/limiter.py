@@ -94,7 +94,7 @@ class Limiter:
         return bounded
 
     def _brake_by_hand(self) -> list[float]:
-        """Bounded stop where ruckig has no answer: every axis loses speed at its acceleration limit, and rests there."""
+        """Stop within bounds where ruckig has no answer: every axis loses speed at its acceleration limit."""
         self.is_failed = True
         dt = self._tick_s
         at, speed = self._now.current_position, self._now.current_velocity

@@ -145,7 +145,7 @@ class HandReflexes:
             self._move(self._open, percept)
 
     def _decide_empty(self, percept: Percept) -> None:
-        """An empty hand opens again, so that another grasp can follow; a moment's doubt about the object is not loss."""
+        """An empty hand opens again, so that another grasp can follow; a moment's doubt is not loss."""
         if self._empty_at_ns is None:
             self._empty_at_ns = percept.stamp_ns
         elif not percept.grip.is_moving and percept.stamp_ns - self._empty_at_ns >= DOUBT_S * 1e9:

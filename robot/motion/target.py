@@ -93,7 +93,7 @@ def advance_twist(at_m: Vec3, intent: Twist, limits: TargetLimits, duration_s: f
 
 
 def guard(at_m: Vec3, step_m: Vec3, limits: TargetLimits, duration_s: float) -> tuple[Vec3, bool]:
-    """Slow a step near the table: below the guard height the target sinks and slides at guarded speed, and rises freely.
+    """Slow a step near the table: below the guard height the target sinks and slides at guarded speed; it rises freely.
 
     Returns:
         The step and whether it was slowed.

@@ -149,7 +149,9 @@ def check_intent_age(intent_ns: int, now_ns: int, limits: GateLimits) -> Refusal
     if 0 <= age_ns <= limits.intent_max_age_ns:
         return None
     most_s = limits.intent_max_age_ns / 1e9
-    return Refusal(Reason.STALE_INTENT, f"expected rest {most_s:g} s after an intent, came motion at {age_ns / 1e9:g} s")
+    return Refusal(
+        Reason.STALE_INTENT, f"expected rest {most_s:g} s after an intent, came motion at {age_ns / 1e9:g} s"
+    )
 
 
 def check_joint_range(q_rad: Vec6, limits: GateLimits) -> Refusal | None:
@@ -204,7 +206,9 @@ def check_force(force_n: float, force_before_n: float, limits: GateLimits) -> Re
         return None
     if force_n <= limits.impact_max_n and force_before_n <= limits.force_max_n:
         return None
-    detail = f"expected at most {limits.force_max_n:g} N on the tool ({limits.impact_max_n:g} in a blow), came {force_n:g}"
+    detail = (
+        f"expected at most {limits.force_max_n:g} N on the tool ({limits.impact_max_n:g} in a blow), came {force_n:g}"
+    )
     return Refusal(Reason.FORCE, detail, force_n - limits.force_max_n)
 
 

@@ -4,7 +4,7 @@ import math
 
 from robot.hal.protocols import Arm
 from robot.kinematics import ToolChain
-from robot.messages import ArmCommand, ArmState, Outcome, Verdict
+from robot.messages import ArmCommand, ArmState, Outcome, Vec6, Verdict
 from robot.safety.checks import (
     Reason,
     Refusal,
@@ -37,7 +37,7 @@ class Gate:
         self._arm, self._limits, self._chain = arm, limits, chain
         self._sequence = 0
         self._force_before_n = 0.0
-        self._q_rad = (0.0,) * 6
+        self._q_rad: Vec6 = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
         self._intent_ns = 0
         self._latched: Refusal | None = None
 
