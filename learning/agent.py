@@ -235,7 +235,7 @@ class Agent:
             intent = experts.act(scene.percept)
             lap("experts")
             result = station.step(intent)
-            lap("station")
+            lap("stack")
             if result.is_void:
                 return TrialOutcome.VOID, step
             came_about = self._take_in(scene, result.percept)

@@ -20,8 +20,15 @@ HALF = 0.5
 class Learner(Protocol):
     """An agent and the station it acts through; whoever makes one also closes it."""
 
-    agent: Agent
-    station: Station
+    @property
+    def agent(self) -> Agent:
+        """Who acts."""
+        ...
+
+    @property
+    def station(self) -> Station:
+        """Where."""
+        ...
 
     def close(self) -> None:
         """Release the station. Idempotent."""

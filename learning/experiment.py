@@ -208,13 +208,12 @@ class Experiment:
 
     def _settle(self, *, at_most: int) -> None:
         """Write finished evaluations and the checkpoints that waited for them."""
-        for rows in self._pool.collect(at_most=at_most):
-            self._tables.append("evaluations", rows)
-            self._tables.flush()
-            self._watcher.evaluated(rows)
-            self._stopwatch.lap("evaluation")
-            self._keep_checkpoints()
-        self._stopwatch.lap("evaluation")
+        with self._stopwatch.all_booked_to("evaluation"):
+            for rows in self._pool.collect(at_most=at_most):
+                self._tables.append("evaluations", rows)
+                self._tables.flush()
+                self._watcher.evaluated(rows)
+                self._keep_checkpoints()
 
     def _keep_checkpoints(self) -> None:
         while self._waiting and self._waiting[0].n_evaluation_rows <= self._tables.n_rows("evaluations"):

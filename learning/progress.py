@@ -65,7 +65,7 @@ class Progress:
         self._recent = [deque[bool](maxlen=RECENT) for _ in goals]
         self._tested: list[float | None] = [None] * len(goals)
         self._goal = 0
-        self._n_steps = 0
+        self.n_steps = 0
         self._steps, self._epochs = Rate(), Rate()
         self._shown_s = self._started_s = now_s()
         self._live: Live | None = None
@@ -93,11 +93,11 @@ class Progress:
     def epoch_ended(self, record: EpochRecord) -> None:
         """An epoch is over."""
         self._n_done = record.epoch + 1
-        self._n_steps += record.n_steps
+        self.n_steps += record.n_steps
         if not record.is_void:
             self._recent[record.goal].append(record.is_achieved)
         now_s = self._now_s()
-        self._steps.mark(now_s, self._n_steps)
+        self._steps.mark(now_s, self.n_steps)
         self._epochs.mark(now_s, self._n_done)
 
     def evaluated(self, rows: Sequence[EvaluationRow]) -> None:

@@ -7,6 +7,8 @@ from typing import IO, Self
 
 import msgspec
 
+from config.loader import load_resolved
+from config.resolved import Resolved
 from learning.checkpoint import CheckpointStore, write_atomically
 from learning.errors import RunFolderError
 from learning.rows import EvaluationRow, GoalRow, TrialRow, read_rows
@@ -14,6 +16,8 @@ from learning.rows import EvaluationRow, GoalRow, TrialRow, read_rows
 __all__ = ["FORMAT", "GoalInfo", "Manifest", "RunFolder"]
 
 FORMAT = 1
+CONFIG_NAME = "config.yaml"
+MANIFEST_NAME = "run.json"
 
 
 class GoalInfo(msgspec.Struct, frozen=True, kw_only=True):
@@ -60,10 +64,13 @@ class RunFolder:
 
     # --------------------------------------------------------------------------------------------------------- read
 
-    @property
-    def config_path(self) -> Path:
-        """The resolved config."""
-        return self.path / "config.yaml"
+    def config(self) -> Resolved:
+        """Return the resolved config.
+
+        Raises:
+            ConfigError: it is missing or was changed into something wrong.
+        """
+        return load_resolved(self.path / CONFIG_NAME)
 
     @property
     def figures(self) -> Path:
@@ -72,7 +79,7 @@ class RunFolder:
 
     def holds_run(self) -> bool:
         """Whether a run was started here."""
-        return (self.path / "run.json").is_file()
+        return (self.path / MANIFEST_NAME).is_file() and (self.path / CONFIG_NAME).is_file()
 
     def manifest(self) -> Manifest:
         """Return what was run.
@@ -80,7 +87,7 @@ class RunFolder:
         Raises:
             RunFolderError: this is no run folder, or one of another format.
         """
-        path = self.path / "run.json"
+        path = self.path / MANIFEST_NAME
         try:
             manifest = msgspec.json.decode(path.read_bytes(), type=Manifest)
         except OSError as error:
@@ -107,8 +114,8 @@ class RunFolder:
 
     # -------------------------------------------------------------------------------------------------------- write
 
-    def start(self, manifest: Manifest, config: str) -> None:
-        """Make the folder and write what is to be run.
+    def refuse_unless_empty(self) -> None:
+        """Check that a run may start here.
 
         Raises:
             RunFolderError: the folder holds a run already, or something else.
@@ -117,16 +124,19 @@ class RunFolder:
             raise RunFolderError(
                 f"{self.path} holds a run already: go on with it by --resume, or name another folder by --out"
             )
-        foreign = sorted(entry.name for entry in self.path.iterdir() if not self._is_ours(entry, config))
+        foreign = sorted(entry.name for entry in self.path.iterdir() if not _is_left_over(entry))
         if foreign:
             raise RunFolderError(f"{self.path}: expected an empty or new folder, found {foreign[0]} in it")
-        write_atomically(self.config_path, config.encode())
-        self.write_json("run.json", manifest)
 
-    def _is_ours(self, entry: Path, config: str) -> bool:
-        """Whether a file is what a start that was killed half-way leaves behind."""
-        is_config = entry == self.config_path and entry.read_bytes() == config.encode()
-        return is_config or entry.name == "lock" or entry.suffix == ".tmp"
+    def start(self, manifest: Manifest, config: str) -> None:
+        """Write what is to be run; the config comes last and makes the folder a run's.
+
+        Raises:
+            RunFolderError: the folder holds a run already, or something else.
+        """
+        self.refuse_unless_empty()
+        self.write_json(MANIFEST_NAME, manifest)
+        write_atomically(self.path / CONFIG_NAME, config.encode())
 
     def write_json(self, name: str, value: msgspec.Struct | dict[str, object]) -> None:
         """Write one JSON file, indented."""
@@ -154,3 +164,8 @@ class RunFolder:
         if self._lock is not None:
             self._lock.close()
             self._lock = None
+
+
+def _is_left_over(entry: Path) -> bool:
+    """Whether a file is what a start that was killed half-way leaves behind."""
+    return entry.name in ("lock", MANIFEST_NAME) or entry.suffix == ".tmp"

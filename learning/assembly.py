@@ -1,0 +1,74 @@
+"""From a resolved config to a learner: an agent of the config's layers, and the rig's station to act through."""
+
+from functools import partial
+
+import torch
+
+from config.resolved import Resolved
+from learning.agent import Agent
+from learning.evaluation_pool import MakeLearner
+from learning.expert_set import ExpertSet
+from learning.goal_selector import GoalSelector
+from learning.goals import GoalJudge
+from learning.seeds import named_generator
+from learning.stopwatch import Stopwatch
+from learning.subgoal_selector import make_subgoal_selector
+from robot.messages import PlantIdentity, StationSpec
+from robot.operated import OperatedStation
+from robot.rigs import build_operator, build_plant, build_station
+from robot.timed import time_world
+
+__all__ = ["RobotLearner", "build_agent", "learner_maker"]
+
+
+class RobotLearner:
+    """An agent and the station it acts through (learning.evaluation.Learner)."""
+
+    def __init__(self, resolved: Resolved, *, seed: int, stopwatch: Stopwatch | None = None) -> None:
+        """Build plant and station, arm it where nobody has to be there for that, and build the agent.
+
+        Args:
+            resolved: everything a run is made of.
+            seed: root seed of the run.
+            stopwatch: hears of every layer's time; None measures nothing.
+        """
+        # One small network at a time: more threads cost more than they bring, and the number would change the sums.
+        torch.set_num_threads(1)
+        plant = build_plant(rig=resolved.rig, arm=resolved.arm, scenario=resolved.scenario)
+        if stopwatch is not None:
+            time_world(plant, stopwatch.lap)
+        self.identity: PlantIdentity = plant.identity
+        self.model_sha256: str | None = getattr(plant, "model_sha256", None)
+        self.station = OperatedStation(build_station(resolved, plant=plant), build_operator(resolved.rig))
+        self.station.connect()
+        self.agent = build_agent(resolved, self.station.spec, seed=seed, stopwatch=stopwatch)
+
+    def close(self) -> None:
+        """Release the station. Idempotent."""
+        self.station.close()
+
+
+def build_agent(resolved: Resolved, spec: StationSpec, *, seed: int, stopwatch: Stopwatch | None = None) -> Agent:
+    """Return an agent that has learnt nothing yet. Its judge alone knows what the goals are about."""
+    learning, scenario = resolved.learning, resolved.scenario
+    n_goals = len(scenario.goals)
+    return Agent(
+        goal_selector=GoalSelector(
+            n_goals=n_goals,
+            config=learning.goal_selection,
+            subgoals=learning.subgoal_selection,
+            rng=named_generator(seed, "goal_selector"),
+        ),
+        subgoal_selector=make_subgoal_selector(
+            n_goals=n_goals, config=learning.subgoal_selection, rng=named_generator(seed, "subgoal_selector")
+        ),
+        experts=ExpertSet(learning, spec, n_goals=n_goals, rng=named_generator(seed, "experts")),
+        judge=GoalJudge(scenario, spec),
+        protocol=learning.experiment,
+        stopwatch=stopwatch,
+    )
+
+
+def learner_maker(resolved: Resolved, *, seed: int) -> MakeLearner:
+    """Return what makes a learner of its own in another process."""
+    return partial(RobotLearner, resolved, seed=seed)

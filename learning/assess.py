@@ -1,0 +1,53 @@
+"""A test of what a run's newest checkpoint holds, apart from the run itself."""
+
+from learning.assembly import RobotLearner
+from learning.evaluation import GoalTest, evaluation_row, learnt_graph, run_test
+from learning.metrics import graph_errors, reachable_states
+from learning.rows import EvaluationRow
+from learning.run_folder import RunFolder
+from robot.oracle import rules_oracle
+
+__all__ = ["assess"]
+
+
+def assess(folder: RunFolder, *, n_tests: int, seed: int | None, rules_epoch: int | None) -> list[EvaluationRow]:
+    """Return a row a goal: learning off, the newest checkpoint, from fresh table layouts.
+
+    Args:
+        folder: a run's folder; it is only read.
+        n_tests: test epochs a goal.
+        seed: root seed of the layouts; None takes the run's own, which gives what the run's own evaluation gave.
+        rules_epoch: epoch whose rules are in force; None takes the last one learnt.
+
+    Raises:
+        RunFolderError: this is no run folder.
+        CheckpointError: no checkpoint can be read.
+    """
+    manifest, resolved = folder.manifest(), folder.config()
+    state, _ = folder.checkpoints.newest()
+    epoch = max(0, state["n_done"] - 1) if rules_epoch is None else rules_epoch
+    n_goals, oracle = len(manifest.goals), rules_oracle(resolved)
+    tests = [
+        GoalTest(
+            root_seed=manifest.seed if seed is None else seed,
+            epoch=state["n_done"],
+            rules_epoch=epoch,
+            goal=goal,
+            n_tests=n_tests,
+            n_trials=manifest.n_trials,
+        )
+        for goal in range(n_goals)
+    ]
+    learner = RobotLearner(resolved, seed=manifest.seed)
+    try:
+        learner.agent.load_state_dict(state["agent"])
+        scores = [run_test(learner.agent, learner.station, test) for test in tests]
+        predicted = learnt_graph(learner.agent)
+    finally:
+        learner.close()
+    graph: list[tuple[int, int] | None] = [None] * n_goals
+    if predicted is not None:
+        states = reachable_states(lambda goal, latched: oracle(goal, latched, epoch), n_goals)
+        wrong = graph_errors(predicted, lambda goal, latched: oracle(goal, latched, epoch), states, n_goals)
+        graph = [(len(states), n) for n in wrong]
+    return [evaluation_row(test, score, entry) for test, score, entry in zip(tests, scores, graph, strict=True)]

@@ -1,0 +1,197 @@
+"""Commands of the learning room: learn, evaluate, explain, report. The edge: terminal, files and the host's clock."""
+
+import functools
+import os
+from collections.abc import Callable
+from pathlib import Path
+from time import perf_counter
+from typing import TYPE_CHECKING, Annotated, ParamSpec, TypeVar
+
+import msgspec
+import typer
+from rich.console import Console
+
+from learning.ended import Ended
+from learning.errors import LearningError, RunFolderError
+from learning.figures import curriculum_figure, performance_figure, save
+from learning.progress import Progress
+from learning.report import Run, group_runs, load_run, report_of
+from learning.run_folder import RunFolder
+from learning.stop_request import StopRequest
+from learning.stopwatch import Stopwatch
+from learning.telling import profile_of, profile_table, report_table, score_table, summary_lines
+from learning.wanted import Wanted
+
+if TYPE_CHECKING:
+    from learning.session import Session
+
+__all__ = ["evaluate", "explain", "learn", "report"]
+
+EXIT_FAILED, EXIT_USAGE, EXIT_INTERRUPTED = 1, 2, 130
+MAX_WORKERS = 4
+
+P = ParamSpec("P")
+R = TypeVar("R")
+
+
+def _one_line_errors(command: Callable[P, R]) -> Callable[P, R]:
+    """Turn errors raised on purpose into one line and an exit code."""
+
+    @functools.wraps(command)
+    def run(*args: P.args, **kwargs: P.kwargs) -> R:
+        try:
+            return command(*args, **kwargs)
+        except LearningError as error:
+            typer.echo(f"error: {error}", err=True)
+            raise typer.Exit(EXIT_USAGE if isinstance(error, RunFolderError) else EXIT_FAILED) from error
+
+    return run
+
+
+@_one_line_errors
+def learn(
+    scenario: Annotated[str | None, typer.Option(help="Shipped scenario or a file.  [default: paper]")] = None,
+    rig: Annotated[str | None, typer.Option(help="Shipped rig or a file.  [default: twin]")] = None,
+    preset: Annotated[str | None, typer.Option(help="Shipped learner or a file.  [default: default]")] = None,
+    seed: Annotated[int | None, typer.Option(min=0, help="Root seed of everything drawn.  [default: 0]")] = None,
+    epochs: Annotated[int | None, typer.Option(min=1, help="Epochs, in place of the learner's own number.")] = None,
+    out: Annotated[Path | None, typer.Option(help="Run folder.  [default: runs/SCENARIO-PRESET-SEED]")] = None,
+    workers: Annotated[int | None, typer.Option(min=0, help="Evaluation processes beside this one.")] = None,
+    *,
+    resume: Annotated[
+        bool, typer.Option("--resume", help="Go on with the run in the folder, if there is one.")
+    ] = False,
+    judged: Annotated[bool, typer.Option("--judged", help="Evaluate densely, 20 test epochs a goal.")] = False,
+    json: Annotated[bool, typer.Option("--json", help="Print the summary as one JSON object.")] = False,
+) -> None:
+    """Let the arm teach itself a scenario's goals; leave a run folder with metrics, checkpoints and figures.
+
+    Ctrl-C stops at the end of the epoch in hand (exit code 130) and loses nothing; --resume goes on, bit for bit.
+    """
+    from learning.session import open_session  # brings torch, seconds that reports do not need
+
+    wanted = Wanted(scenario=scenario, rig=rig, preset=preset, seed=seed, epochs=epochs, judged=judged)
+    folder = RunFolder(out or _default_folder(wanted))
+    n_workers = _default_workers() if workers is None else workers
+    console = Console(stderr=True)
+    stopwatch = Stopwatch(perf_counter)
+    with folder:
+        session = open_session(folder, wanted, resume=resume, stopwatch=stopwatch)
+        try:
+            ended = _run(session, folder, console, n_workers)
+        finally:
+            session.close()
+        run = load_run(folder)
+        folder.write_json("summary.json", run.summary)
+        folder.write_json("profile.json", profile_of(ended))
+        _write_figures([run], folder.figures)
+    if json:
+        typer.echo(msgspec.json.encode(run.summary).decode())
+    else:
+        _tell(run, ended)
+
+
+def _run(session: "Session", folder: RunFolder, console: Console, n_workers: int) -> Ended:
+    """Run to the end; when stopped before, say how to go on and leave with the exit code of an interrupt."""
+    manifest = session.manifest
+    goals = [goal.name for goal in manifest.goals]
+    progress = Progress(
+        goals=goals, n_epochs=manifest.n_epochs, n_done=session.n_done, now_s=perf_counter, console=console
+    )
+    how_to_go_on = f"go on with: autotelic learn --resume --out {folder.path}"
+    try:
+        with progress, StopRequest(progress.say) as stop:
+            for remark in session.remarks:
+                progress.say(remark)
+            ended = session.run(progress, n_workers=n_workers, should_stop=stop)
+    except KeyboardInterrupt:
+        typer.echo(f"stopped at once; {how_to_go_on}", err=True)
+        raise typer.Exit(EXIT_INTERRUPTED) from None
+    if not ended.is_finished:
+        typer.echo(f"stopped after epoch {ended.n_done} of {ended.n_epochs}; {how_to_go_on}", err=True)
+        raise typer.Exit(EXIT_INTERRUPTED)
+    return ended
+
+
+@_one_line_errors
+def evaluate(
+    run: Annotated[Path, typer.Argument(help="Run folder.")],
+    tests: Annotated[int, typer.Option(min=1, help="Test epochs a goal.")] = 20,
+    seed: Annotated[int | None, typer.Option(min=0, help="Seed of the layouts.  [default: the run's]")] = None,
+    rules_epoch: Annotated[
+        int | None, typer.Option(min=0, help="Epoch whose rules are in force.  [default: the last one learnt]")
+    ] = None,
+    *,
+    json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
+) -> None:
+    """Test what a run's newest checkpoint holds: learning off, fresh table layouts, every goal."""
+    from learning.assess import assess  # brings torch, seconds that reports do not need
+
+    folder = RunFolder(run)
+    goals = [goal.name for goal in folder.manifest().goals]
+    with Console(stderr=True).status(f"testing {len(goals)} goals, {tests} epochs each"):
+        rows = assess(folder, n_tests=tests, seed=seed, rules_epoch=rules_epoch)
+    if json:
+        typer.echo(msgspec.json.encode({"goals": goals, "rows": rows}).decode())
+    else:
+        Console().print(score_table(rows, goals))
+
+
+@_one_line_errors
+def report(
+    runs: Annotated[list[Path], typer.Argument(help="Run folders, or folders of run folders.")],
+    out: Annotated[Path | None, typer.Option(help="Where to write.  [default: the run's figures, else report]")] = None,
+    *,
+    json: Annotated[bool, typer.Option("--json", help="Print the figures of merit as one JSON object.")] = False,
+) -> None:
+    """Draw both panels of the paper's Figure 2 and the curriculum; runs of one learner become median and range."""
+    loaded = [load_run(folder) for path in runs for folder in _run_folders(path)]
+    single = loaded[0].folder if len(loaded) == 1 else None
+    folder = out or (Path("report") if single is None else RunFolder(Path(single)).figures)
+    paths = _write_figures(loaded, folder)
+    groups = group_runs(loaded)
+    if json:
+        typer.echo(msgspec.json.encode(report_of(groups)).decode())
+        return
+    Console().print(report_table(report_of(groups)))
+    for path in paths:
+        typer.echo(path)
+
+
+def _write_figures(runs: list[Run], folder: Path) -> list[Path]:
+    """Draw the figures of runs, write them and their figures of merit, and return the files."""
+    groups = group_runs(runs)
+    paths = [
+        *save(performance_figure(groups), folder, "figure2"),
+        *save(curriculum_figure(groups), folder, "curriculum"),
+        folder / "summary.json",
+    ]
+    paths[-1].write_bytes(msgspec.json.format(msgspec.json.encode(report_of(groups)), indent=2) + b"\n")
+    return paths
+
+
+def _run_folders(path: Path) -> list[RunFolder]:
+    """Return the run folder that a path names, or those inside it, in order of their names."""
+    folder = RunFolder(path)
+    if folder.holds_run() or not path.is_dir():
+        return [folder]
+    inside = [RunFolder(entry) for entry in sorted(path.iterdir()) if entry.is_dir()]
+    return [entry for entry in inside if entry.holds_run()] or [folder]
+
+
+def _tell(run: Run, ended: Ended) -> None:
+    console = Console()
+    for line in summary_lines(run):
+        console.print(line, highlight=False, soft_wrap=True)
+    console.print(profile_table(ended))
+    console.print(f"figures in {RunFolder(Path(run.folder)).figures}", highlight=False, soft_wrap=True)
+
+
+def _default_folder(wanted: Wanted) -> Path:
+    parts = (Path(wanted.scenario or "paper").stem, Path(wanted.preset or "default").stem, str(wanted.seed or 0))
+    return Path("runs") / "-".join(parts)
+
+
+def _default_workers() -> int:
+    """Return how many workers keep the processors busy, this process counted."""
+    return max(0, min(MAX_WORKERS, len(os.sched_getaffinity(0)) - 1))

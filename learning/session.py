@@ -1,0 +1,141 @@
+"""One session of a run: begin it or take it up again, learn, and leave a folder that tells all."""
+
+from collections.abc import Callable
+from typing import Any
+
+from config.resolved import Resolved, dump_resolved
+from learning.assembly import RobotLearner, build_agent, learner_maker
+from learning.ended import Ended
+from learning.evaluation_pool import EvaluationPool
+from learning.experiment import Experiment, Plan
+from learning.progress import Progress
+from learning.provenance import manifest_of
+from learning.run_folder import Manifest, RunFolder
+from learning.stopwatch import Stopwatch
+from learning.tables import Tables
+from learning.wanted import Wanted, refuse_another, resolve_wanted
+from robot.oracle import rules_oracle
+
+__all__ = ["Session", "open_session"]
+
+
+class Session:
+    """A run that is open for learning. Made by open_session; close it when done."""
+
+    def __init__(
+        self, *, folder: RunFolder, resolved: Resolved, manifest: Manifest, learner: RobotLearner, stopwatch: Stopwatch
+    ) -> None:
+        self.manifest = manifest
+        self.remarks: list[str] = []
+        """What a person should know before it goes on."""
+        self.state: dict[str, Any] | None = None
+        """The checkpoint to go on from."""
+        self._folder = folder
+        self._resolved = resolved
+        self._learner = learner
+        self._stopwatch = stopwatch
+
+    @property
+    def n_done(self) -> int:
+        """Epochs done before this session."""
+        return 0 if self.state is None else self.state["n_done"]
+
+    def run(self, progress: Progress, *, n_workers: int, should_stop: Callable[[], bool]) -> Ended:
+        """Learn until all epochs are done or a stop is asked for.
+
+        Args:
+            progress: is told how it goes.
+            n_workers: evaluation processes beside this one.
+            should_stop: asked at each epoch's end.
+        """
+        started_s, manifest, state = self._stopwatch.now_s(), self.manifest, self.state
+        learner = self._learner
+        pool = EvaluationPool(
+            tester=build_agent(self._resolved, learner.station.spec, seed=manifest.seed),
+            station=learner.station,
+            make_learner=learner_maker(self._resolved, seed=manifest.seed),
+            n_workers=n_workers,
+            report=progress.say,
+        )
+        with pool, Tables(self._folder.path, n_rows=None if state is None else state["n_rows"]) as tables:
+            experiment = Experiment(
+                plan=Plan(seed=manifest.seed, protocol=self._resolved.learning.experiment, changes=manifest.changes),
+                agent=learner.agent,
+                station=learner.station,
+                pool=pool,
+                tables=tables,
+                store=self._folder.checkpoints,
+                watcher=progress,
+                oracle=rules_oracle(self._resolved),
+                stopwatch=self._stopwatch,
+            )
+            if state is not None:
+                experiment.restore(state)
+            n_done = experiment.run(should_stop)
+        return Ended(
+            n_done=n_done,
+            n_epochs=manifest.n_epochs,
+            seconds=self._stopwatch.now_s() - started_s,
+            n_decisions=progress.n_steps,
+            seconds_by_layer=dict(self._stopwatch.seconds_by_layer),
+        )
+
+    def close(self) -> None:
+        """Release the station. Idempotent."""
+        self._learner.close()
+
+
+def open_session(folder: RunFolder, wanted: Wanted, *, resume: bool, stopwatch: Stopwatch) -> Session:
+    """Begin a run in a folder, or read where the run that it holds was left.
+
+    Args:
+        folder: the run's folder, entered.
+        wanted: what was asked for; where a run is gone on with, it must not be another.
+        resume: go on with the run that the folder holds, if it holds one.
+        stopwatch: hears of every layer's time.
+
+    Raises:
+        ConfigError: a config file is missing or wrong.
+        RunFolderError: the folder holds a run that is not to be resumed, or another one, or something else.
+    """
+    if resume and folder.holds_run():
+        return _take_up(folder, wanted, stopwatch)
+    folder.refuse_unless_empty()
+    resolved = resolve_wanted(wanted)
+    session = _assemble(folder, resolved, wanted.seed or 0, stopwatch)
+    folder.start(session.manifest, dump_resolved(resolved))
+    return session
+
+
+def _take_up(folder: RunFolder, wanted: Wanted, stopwatch: Stopwatch) -> Session:
+    then, resolved = folder.manifest(), folder.config()
+    refuse_another(wanted, str(folder.path), resolved, then.seed)
+    session = _assemble(folder, resolved, then.seed, stopwatch)
+    session.remarks += _differences(then, session.manifest)
+    if folder.checkpoints.exists():
+        session.state, passed_over = folder.checkpoints.newest()
+        session.remarks += [f"passed over a torn checkpoint: {reason}" for reason in passed_over]
+    return session
+
+
+def _assemble(folder: RunFolder, resolved: Resolved, seed: int, stopwatch: Stopwatch) -> Session:
+    learner = RobotLearner(resolved, seed=seed, stopwatch=stopwatch)
+    manifest = manifest_of(
+        resolved,
+        seed=seed,
+        oracle=rules_oracle(resolved),
+        identity=learner.identity,
+        model_sha256=learner.model_sha256,
+    )
+    return Session(folder=folder, resolved=resolved, manifest=manifest, learner=learner, stopwatch=stopwatch)
+
+
+def _differences(then: Manifest, now: Manifest) -> list[str]:
+    """Say what has changed since the run began that could change its course."""
+    changed = [
+        f"{name} was {then.versions.get(name)}, is {version}"
+        for name, version in now.versions.items()
+        if then.versions.get(name) != version
+    ]
+    changed += ["the plant's model is another"] if then.model_sha256 != now.model_sha256 else []
+    return [f"since the run began, {'; '.join(changed)}: it may go on differently"] if changed else []

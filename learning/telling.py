@@ -1,0 +1,101 @@
+"""Figures of merit in words and tables, for a terminal. Pure."""
+
+from collections.abc import Iterator, Sequence
+
+from rich.table import Table
+
+from learning.ended import Ended
+from learning.metrics import EraSummary
+from learning.progress import duration_text
+from learning.report import Count, Report, Run, Spread
+from learning.rows import EvaluationRow
+
+__all__ = ["profile_of", "profile_table", "report_table", "score_table", "summary_lines"]
+
+MICRO = 1e6
+
+
+def summary_lines(run: Run) -> Iterator[str]:
+    """Yield what a run came to, a line a set of rules."""
+    summary = run.summary
+    yield (
+        f"{run.folder}: {summary.n_epochs} epochs, {summary.n_trials} trials, {summary.n_time_steps} decisions"
+        + (f", {summary.n_void_epochs} void epochs" if summary.n_void_epochs else "")
+    )
+    for i, era in enumerate(summary.eras):
+        yield f"  {_era_line(era, is_first=i == 0)}"
+
+
+def _era_line(era: EraSummary, *, is_first: bool) -> str:
+    word = "learnt" if is_first else f"rules changed at epoch {era.from_epoch}: recovered"
+    after = "not yet" if era.learnt_after is None else f"after {era.learnt_after} epochs"
+    graph = "" if era.graph_right_after is None else f", graph right after {era.graph_right_after}"
+    shares = [share for share in era.success_by_goal if share is not None]
+    success = f", least success at the end {min(shares):.0%}" if shares else ""
+    excess = era.trials_over_optimum
+    trials = "" if excess is None else f", {excess:.2f} trials over the optimum"
+    return f"{word} {after}{graph}{success}{trials}"
+
+
+def report_table(report: Report) -> Table:
+    """Return a table of all groups and sets of rules: median [least to greatest] over runs."""
+    table = Table(
+        "learner", "rules from", "learnt", "after epochs", "graph right after", "trials over optimum", "success"
+    )
+    for group in report.groups:
+        for era in group.eras:
+            table.add_row(
+                group.name,
+                str(era.from_epoch),
+                _count(era.learnt),
+                _spread(era.learnt_after, "{:.0f}"),
+                _spread(era.graph_right_after, "{:.0f}"),
+                _spread(era.trials_over_optimum, "{:.2f}"),
+                _spread(era.success, "{:.0%}"),
+            )
+    return table
+
+
+def score_table(rows: Sequence[EvaluationRow], goals: Sequence[str]) -> Table:
+    """Return a table of one evaluation."""
+    table = Table("goal", "achieved", "trials when achieved", "graph wrong in")
+    for row in rows:
+        trials = f"{row.trials_achieved / row.n_successes:.2f}" if row.n_successes else "–"
+        graph = "–" if row.graph_cases is None else f"{row.graph_wrong} of {row.graph_cases} states"
+        table.add_row(goals[row.goal], f"{row.n_successes} of {row.n_tests}", trials, graph)
+    return table
+
+
+def profile_of(ended: Ended) -> dict[str, object]:
+    """Return where a session's time went, by layer."""
+    n = max(1, ended.n_decisions)
+    return {
+        "seconds": ended.seconds,
+        "n_decisions": ended.n_decisions,
+        "decisions_per_s": ended.n_decisions / ended.seconds if ended.seconds else 0.0,
+        "seconds_by_layer": ended.seconds_by_layer,
+        "us_per_decision_by_layer": {name: MICRO * s / n for name, s in ended.seconds_by_layer.items()},
+    }
+
+
+def profile_table(ended: Ended) -> Table:
+    """Return where a session's time went, greatest share first."""
+    table = Table("layer", "seconds", "share", "µs a decision", title=f"{duration_text(ended.seconds)}, by layer")
+    total = sum(ended.seconds_by_layer.values()) or 1.0
+    for name, seconds in sorted(ended.seconds_by_layer.items(), key=lambda entry: -entry[1]):
+        per_decision = f"{MICRO * seconds / max(1, ended.n_decisions):.0f}"
+        table.add_row(name, f"{seconds:.1f}", f"{seconds / total:.0%}", per_decision)
+    return table
+
+
+def _count(count: Count) -> str:
+    return f"{count.n}/{count.of} ({count.share_low:.0%}–{count.share_high:.0%})"
+
+
+def _spread(spread: Spread | None, form: str) -> str:
+    if spread is None:
+        return "–"
+    middle = form.format(spread.median)
+    if spread.of == 1:
+        return middle
+    return f"{middle} [{form.format(spread.least)} to {form.format(spread.greatest)}]"
