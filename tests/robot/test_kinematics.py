@@ -1,0 +1,104 @@
+import math
+
+import mujoco
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from config.loader import load_arm
+from robot.description import arm_model, forward_kinematics, tool_down
+from robot.kinematics import Kinematics, ToolChain, UnreachableError
+
+ARM = load_arm("ur5e")
+KINEMATICS = Kinematics(ARM)
+CHAIN = ToolChain(ARM)
+MODEL = arm_model(ARM)
+JOINTS = st.tuples(*[st.floats(-3.1, 3.1)] * 6)
+LOW, HIGH = np.array(ARM.motion.workspace_m)
+
+
+def ur_table(q):
+    """UR's published table, written out once more: the tool of a joint vector."""
+    rows = [
+        (0, 0.1625, math.pi / 2),
+        (-0.425, 0, 0),
+        (-0.3922, 0, 0),
+        (0, 0.1333, math.pi / 2),
+        (0, 0.0997, -math.pi / 2),
+        (0, 0.0996 + 0.1628, 0),
+    ]
+    T = np.eye(4)
+    for (a, d, alpha), t in zip(rows, q, strict=True):
+        c, s, ca, sa = math.cos(t), math.sin(t), math.cos(alpha), math.sin(alpha)
+        T = T @ np.array([[c, -s * ca, s * sa, a * c], [s, c * ca, -c * sa, a * s], [0, sa, ca, d], [0, 0, 0, 1]])
+    return T
+
+
+@given(JOINTS)
+def test_the_fast_chain_is_the_published_table_to_a_micrometre(q):
+    T = ur_table(q)
+    assert np.allclose(CHAIN.tcp(q), T[:3, 3], atol=1e-6)
+    tcp, tip = CHAIN.tcp_and_tip(q)
+    assert np.allclose(tcp, T[:3, 3], atol=1e-6)
+    assert np.allclose(tip, T[:3, 3] + ARM.tool.tip_below_tcp_m * T[:3, 2], atol=1e-6)
+
+
+@given(JOINTS)
+def test_the_description_and_the_simulated_arm_agree_with_the_chain(q):
+    assert np.allclose(forward_kinematics(ARM, q)[:3, 3], CHAIN.tcp(q), atol=1e-6)
+    data = mujoco.MjData(MODEL)
+    for joint, value in zip(ARM.joints, q, strict=True):
+        data.joint(joint.name).qpos[0] = value
+    mujoco.mj_kinematics(MODEL, data)
+    assert np.allclose(data.site("tcp").xpos, CHAIN.tcp(q), atol=1e-6)
+
+
+@given(JOINTS)
+def test_placo_agrees_with_the_chain(q):
+    robot, lo = KINEMATICS._robot, KINEMATICS._offset
+    robot.state.q[lo : lo + 6] = q
+    robot.update_kinematics()
+    assert np.allclose(robot.get_T_world_frame("tcp")[:3, 3], CHAIN.tcp(q), atol=1e-6)
+
+
+@given(JOINTS)
+def test_the_chains_quaternion_is_the_tables_rotation(q):
+    R = np.zeros(9)
+    mujoco.mju_quat2Mat(R, np.array(CHAIN.quat(q)))
+    assert np.allclose(R.reshape(3, 3), ur_table(q)[:3, :3], atol=1e-9)
+
+
+@pytest.mark.parametrize("yaw", [None, 0.5, -0.7])
+def test_the_inverse_brings_the_tool_down_everywhere_in_the_workspace(yaw):
+    rng = np.random.default_rng(3)
+    for _ in range(100):
+        x, y, z = rng.uniform(LOW, HIGH).tolist()
+        q = KINEMATICS.solve((x, y, z), ARM.home_rad, yaw_rad=yaw)
+        T = forward_kinematics(ARM, q)
+        assert np.allclose(T[:3, 3], (x, y, z), atol=1e-5)
+        assert np.allclose(T[:3, :3], tool_down(ARM.tool_yaw_rad if yaw is None else yaw), atol=1e-4)
+        assert all(j.range_rad[0] <= v <= j.range_rad[1] for j, v in zip(ARM.joints, q, strict=True))
+
+
+def test_the_same_question_has_the_same_answer_whatever_was_asked_between():
+    other = Kinematics(ARM)
+    rng = np.random.default_rng(4)
+    for _ in range(20):
+        x, y, z = rng.uniform(LOW, HIGH).tolist()
+        first = KINEMATICS.solve((x, y, z), ARM.home_rad)
+        KINEMATICS.solve((0.3, 0.2, 0.1), ARM.home_rad, yaw_rad=0.3)
+        assert KINEMATICS.solve((x, y, z), ARM.home_rad) == first == other.solve((x, y, z), ARM.home_rad)
+
+
+@pytest.mark.parametrize("where", [(2.0, 0.0, 0.1), (0.0, 0.0, 0.2), (math.nan, 0.0, 0.2), (math.inf, 0.0, 0.2)])
+def test_what_cannot_be_reached_is_said_and_does_not_spoil_the_next_answer(where):
+    before = KINEMATICS.solve((0.42, 0.0, 0.2), ARM.home_rad)
+    with pytest.raises(UnreachableError, match="reach"):
+        KINEMATICS.solve(where, ARM.home_rad)
+    assert KINEMATICS.solve((0.42, 0.0, 0.2), ARM.home_rad) == before
+
+
+def test_loading_prints_nothing(capfd):
+    Kinematics(ARM)
+    assert capfd.readouterr().out == ""

@@ -1,0 +1,76 @@
+import math
+
+import numpy as np
+import pytest
+
+from robot.motion.limiter import AxisLimits, Limiter
+
+DT = 0.01
+LIMITS = AxisLimits(speed=(1.0, 2.0), acceleration=(5.0, 8.0), jerk=(100.0, 200.0))
+
+
+def run(limiter, n):
+    return np.array([limiter.step() for _ in range(n)])
+
+
+def wander(limiter, rng, n=200):
+    """Give a new target every five ticks."""
+    path = []
+    for _ in range(n):
+        limiter.aim(rng.uniform(-0.3, 0.3, 2).tolist())
+        path += [limiter.step() for _ in range(5)]
+    return np.array(path)
+
+
+def test_it_comes_to_rest_on_the_target_without_overshoot():
+    limiter = Limiter(LIMITS, tick_s=DT)
+    limiter.aim([0.2, -0.1])
+    path = run(limiter, 200)
+    assert path[-1] == pytest.approx([0.2, -0.1], abs=1e-9)
+    assert path[:, 0].max() <= 0.2 + 1e-9
+    assert path[:, 1].min() >= -0.1 - 1e-9
+
+
+def test_speed_acceleration_and_jerk_hold_under_any_targets():
+    path = wander(Limiter(LIMITS, tick_s=DT), np.random.default_rng(0))
+    speed = np.diff(path, axis=0) / DT
+    acceleration = np.diff(speed, axis=0) / DT
+    jerk = np.diff(acceleration, axis=0) / DT
+    assert (np.abs(speed).max(0) <= np.array(LIMITS.speed) * (1 + 1e-6)).all()
+    assert (np.abs(acceleration).max(0) <= np.array(LIMITS.acceleration) * (1 + 1e-6)).all()
+    assert (np.abs(jerk).max(0) <= np.array(LIMITS.jerk) * (1 + 1e-6)).all()
+
+
+def test_braking_rests_ahead_within_the_shortest_way_the_limits_allow():
+    limiter = Limiter(LIMITS, tick_s=DT)
+    limiter.aim([10.0, 0.0])
+    run(limiter, 100)
+    at, speed = limiter.at[0], limiter.speed[0]
+    stop = limiter.brake()
+    # From v, jerk up to a and back: v (v/a + a/j) / 2.
+    assert stop[0] - at == pytest.approx(speed * (speed / 5.0 + 5.0 / 100.0) / 2, rel=0.02)
+    assert run(limiter, 100)[-1] == pytest.approx(stop, abs=1e-9)
+
+
+def test_seeding_forgets_everything_before():
+    rng = np.random.default_rng(1)
+    used, fresh = Limiter(LIMITS, tick_s=DT), Limiter(LIMITS, tick_s=DT)
+    wander(used, rng)
+    used.seed([0.1, 0.2])
+    fresh.seed([0.1, 0.2])
+    assert (wander(used, np.random.default_rng(2)) == wander(fresh, np.random.default_rng(2))).all()
+
+
+def test_what_ruckig_refuses_becomes_a_bounded_stop():
+    limiter = Limiter(LIMITS, tick_s=DT)
+    limiter.aim([5.0, 5.0])
+    before = run(limiter, 60)
+    limiter.aim([math.nan, 0.0])
+    path = np.vstack([before[-2:], run(limiter, 100)])
+    assert limiter.is_failed
+    acceleration = np.diff(np.diff(path, axis=0) / DT, axis=0) / DT
+    assert (np.abs(acceleration).max(0) <= np.array(LIMITS.acceleration) * (1 + 1e-6)).all()
+    assert np.abs(path[-1] - path[-2]).max() == 0.0
+    limiter.aim([0.0, 0.0])
+    assert run(limiter, 600)[-1] == pytest.approx([0.0, 0.0], abs=1e-9)
+    assert not limiter.is_failed
