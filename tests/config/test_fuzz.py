@@ -130,7 +130,7 @@ def test_hostile_files_give_a_config_error_or_a_valid_config(tmp_path, monkeypat
     for i in range(N_FILES // 4):
         kind, text = files[i % len(files)]
         path.write_bytes(spoil(text, rng))
-        for load in (LOADERS[kind], kind_of):
+        for load in (LOADERS[kind], kind_of) if i % 5 == 0 else (LOADERS[kind],):
             try:
                 load(path)
             except ConfigError as refusal:
