@@ -61,19 +61,20 @@ class ContactGuard:
             return (x, y, lowest), True
         return wanted_m, False
 
-    def reseat(self, force_n: Vec3, measured_m: Vec3, target_m: Vec3) -> Vec3 | None:
+    def reseat(self, force_n: Vec3, measured_m: Vec3, commanded_m: Vec3, target_m: Vec3) -> Vec3 | None:
         """Return where the target must go because of the force on the tool, or None to leave it.
 
         Args:
             force_n: Force of the world on the tool.
             measured_m: Where the tool is.
+            commanded_m: Where it was told to be by now.
             target_m: Where it would go.
         """
         if self._held is not None and measured_m[2] < self._held[2] - SUNK_M:
             self._held = None
         fx, fy, fz = force_n
         x, y, z = target_m
-        is_pushed_up = fz > self._force_n and z < measured_m[2]
+        is_pushed_up = fz > self._force_n and min(z, commanded_m[2]) < measured_m[2] - _TINY
         if is_pushed_up:
             z = measured_m[2]
         is_pushed_back = math.hypot(fx, fy) > self._force_n
@@ -82,5 +83,4 @@ class ContactGuard:
         self._was_pushed_back = is_pushed_back
         if is_pushed_up and self._held is None:
             self._held = (x, y, z)
-        moved = (x, y, z)
-        return None if moved == target_m else moved
+        return (x, y, z) if is_pushed_up or (x, y, z) != target_m else None

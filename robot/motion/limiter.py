@@ -90,6 +90,7 @@ class Limiter:
 
     def _bounded(self) -> ruckig.InputParameter:
         bounded = ruckig.InputParameter(self._n)
+        bounded.synchronization = ruckig.Synchronization.Phase
         bounded.max_velocity, bounded.max_acceleration, bounded.max_jerk = self._speed, self._acceleration, self._jerk
         return bounded
 

@@ -75,7 +75,8 @@ class Mover:
         would go on pressing.
         """
         follower = self._follower
-        moved = self._contact.reseat(state.tcp_force_n, state.tcp_position_m, follower.target_m)
+        commanded_m = follower.tcp(follower.q_rad)
+        moved = self._contact.reseat(state.tcp_force_n, state.tcp_position_m, commanded_m, follower.target_m)
         if moved is not None:
             self._limiters.append("contact")
             yaw, back = follower.yaw_rad, self._back_to(state.q_rad)
@@ -126,10 +127,9 @@ class Mover:
     def _back_to(self, measured_rad: Vec6) -> Vec6:
         """Return the command brought back to the measured joints as far as one tick allows."""
         now = self._follower.q_rad
-        back = [
-            a + min(max(b - a, -most), most) for a, b, most in zip(now, measured_rad, self._fall_back_rad, strict=True)
-        ]
-        return back[0], back[1], back[2], back[3], back[4], back[5]
+        change = [b - a for a, b in zip(now, measured_rad, strict=True)]
+        excess = max(abs(c) / most for c, most in zip(change, self._fall_back_rad, strict=True))
+        return measured_rad if excess <= 1.0 else _along(now, change, 1.0 / excess)
 
 
 def _along(a: Vec6, change: list[float], share: float) -> Vec6:

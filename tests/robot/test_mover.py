@@ -1,0 +1,170 @@
+import math
+
+import numpy as np
+import pytest
+
+from config.loader import load_arm
+from robot.kinematics import Kinematics
+from robot.messages import Heading, Hold, JointTarget, Twist
+from robot.motion import Mover
+from tests.support.stations import arm_state
+
+ARM = load_arm("ur5e")
+DT = 0.01
+KINEMATICS = Kinematics(ARM)
+START = (0.42, 0.0, 0.21)
+Q_START = KINEMATICS.solve(START, ARM.home_rad)
+CONTACT = ARM.motion.contact_force_n
+
+
+class Perfect:
+    """An arm that is where it was told, with a force that a test sets."""
+
+    def __init__(self):
+        self.mover = Mover(ARM, table_m=0.0, tick_s=DT)
+        self.q, self.force = Q_START, (0.0, 0.0, 0.0)
+        self.mover.seed(self.state)
+
+    @property
+    def state(self):
+        return arm_state(self.q, tcp_m=KINEMATICS.tcp(self.q), force_n=self.force)
+
+    @property
+    def tcp(self):
+        return KINEMATICS.tcp(self.q)
+
+    def step(self, intent, n_ticks=5):
+        self.mover.begin_step(intent, self.state, duration_s=n_ticks * DT)
+        for _ in range(n_ticks):
+            self.q = self.mover.tick(self.state)
+        return self.mover.limiters
+
+
+@pytest.fixture
+def arm():
+    return Perfect()
+
+
+def go(angle=0.0, distance=0.022, height=0.21):
+    return Heading(heading_rad=angle, distance_m=distance, height_m=height)
+
+
+def test_the_tool_trails_the_target_by_at_most_three_steps_and_rests_on_it(arm):
+    lags = []
+    for _ in range(8):
+        arm.step(go(angle=0.5))
+        lags.append(math.dist(arm.tcp, arm.mover.target_m))
+    assert max(lags) < 3 * 0.022
+    assert arm.mover.target_m[0] == pytest.approx(START[0] + 8 * 0.022 * math.cos(0.5), abs=1e-4)
+    for _ in range(10):
+        arm.step(go(distance=0.0))
+    assert arm.tcp == pytest.approx(arm.mover.target_m, abs=1e-5)
+
+
+def test_turning_back_does_not_carry_the_tool_past_where_the_target_was(arm):
+    for _ in range(6):
+        arm.step(go())
+    furthest = arm.mover.target_m[0]
+    xs = []
+    for _ in range(10):
+        arm.step(go(angle=math.pi))
+        xs.append(arm.tcp[0])
+    assert max(xs) <= furthest + 1e-4
+
+
+def test_a_hold_stops_short_of_the_target(arm):
+    for _ in range(2):
+        arm.step(go())
+    ahead = arm.mover.target_m
+    arm.step(Hold())
+    assert math.dist(arm.mover.target_m, START) < 0.9 * math.dist(ahead, START)
+    for _ in range(8):
+        arm.step(Hold())
+    assert arm.tcp == pytest.approx(arm.mover.target_m, abs=1e-5)
+
+
+def test_the_workspace_and_the_table_stop_the_target(arm):
+    for _ in range(30):
+        limiters = arm.step(go(angle=0.0))
+    assert "workspace" in limiters
+    assert arm.mover.target_m[0] == pytest.approx(ARM.motion.workspace_m[1][0])
+    for _ in range(60):
+        limiters = arm.step(Twist(linear_m_s=(0.0, 0.0, -1.0)))
+    assert "workspace" in limiters
+    assert arm.tcp[2] - ARM.tool.tip_below_tcp_m >= ARM.motion.table_clearance_m
+
+
+def test_a_push_stops_a_descent_at_once_and_is_reported(arm):
+    for _ in range(12):
+        arm.step(go(distance=0.0, height=0.03))
+    z = arm.tcp[2]
+    arm.force = (0.0, 0.0, CONTACT + 1.0)
+    limiters = arm.step(go(distance=0.0, height=0.03))
+    assert "contact" in limiters
+    assert arm.mover.is_in_contact
+    assert arm.tcp[2] == pytest.approx(z, abs=2e-3)
+    for _ in range(10):
+        arm.step(go(distance=0.0, height=0.03))
+    assert arm.tcp[2] > z - 2e-3
+    arm.force = (0.0, 0.0, 0.0)
+    arm.step(go(distance=0.0, height=0.21))
+    assert not arm.mover.is_in_contact
+
+
+def test_falling_back_from_a_push_keeps_every_joints_speed(arm):
+    mover, measured = arm.mover, arm.q
+    path = [arm.q]
+    mover.begin_step(go(distance=0.0, height=0.03), arm_state(measured, tcp_m=START), duration_s=0.2)
+    for _ in range(20):
+        path.append(mover.tick(arm_state(measured, tcp_m=START)))
+    pushed = arm_state(measured, tcp_m=START, force_n=(0.0, 0.0, CONTACT + 1.0))
+    for _ in range(6):
+        path.append(mover.tick(pushed))
+    assert (np.abs(np.diff(path, axis=0)).max(0) <= [DT * j.speed_rad_s for j in ARM.joints]).all()
+    assert path[-1] == pytest.approx(measured, abs=2e-3)
+
+
+def test_joint_targets_go_in_steps_of_the_tool(arm):
+    wanted = KINEMATICS.solve((0.5, 0.15, 0.25), ARM.home_rad)
+    before = arm.mover.target_m
+    assert "max_step" in arm.step(JointTarget(q_rad=wanted))
+    assert math.dist(before, arm.mover.target_m) <= 0.022 * 1.001
+    for _ in range(30):
+        limiters = arm.step(JointTarget(q_rad=wanted))
+    assert limiters == ()
+    assert arm.q == pytest.approx(wanted, abs=1e-5)
+
+
+def test_joint_targets_outside_range_or_workspace_are_stopped_and_said(arm):
+    far = (*Q_START[:5], 50.0)
+    assert "joint_range" in arm.step(JointTarget(q_rad=far))
+    up = (Q_START[0], Q_START[1] - 1.0, *Q_START[2:])
+    for _ in range(40):
+        limiters = arm.step(JointTarget(q_rad=up))
+    assert "workspace" in limiters
+    assert arm.tcp[2] <= ARM.motion.workspace_m[1][2] + 1e-6
+
+
+def test_a_twist_turns_the_tool(arm):
+    for _ in range(20):
+        arm.step(Twist(linear_m_s=(0.0, 0.0, 0.0), angular_rad_s=(0.0, 0.0, 0.5)))
+    for _ in range(10):
+        arm.step(go(distance=0.0))
+    turned = KINEMATICS.solve(START, ARM.home_rad, yaw_rad=ARM.tool_yaw_rad + 0.5)
+    assert arm.q == pytest.approx(turned, abs=1e-3)
+
+
+def test_seeding_forgets_everything_before(arm):
+    for _ in range(7):
+        arm.step(go(angle=1.0, height=0.1))
+    arm.force = (0.0, 0.0, 2 * CONTACT)
+    arm.step(go(distance=0.0, height=0.03))
+    fresh = Perfect()
+    arm.q, arm.force = Q_START, (0.0, 0.0, 0.0)
+    arm.mover.seed(arm.state)
+    for each in (arm, fresh):
+        for k in range(6):
+            each.step(go(angle=0.3 * k, height=0.12))
+    assert arm.q == fresh.q
+    assert arm.mover.target_m == fresh.mover.target_m
+    assert arm.mover.is_in_contact == fresh.mover.is_in_contact
