@@ -16,7 +16,7 @@ from learning.errors import LearningError, RunFolderError
 from learning.figures import curriculum_figure, performance_figure, save
 from learning.progress import Progress
 from learning.report import Run, group_runs, load_run, report_of
-from learning.run_folder import RunFolder
+from learning.run_folder import RunFolder, run_folders
 from learning.stop_request import StopRequest
 from learning.stopwatch import Stopwatch
 from learning.telling import profile_of, profile_table, report_table, score_table, summary_lines
@@ -145,7 +145,7 @@ def report(
     json: Annotated[bool, typer.Option("--json", help="Print the figures of merit as one JSON object.")] = False,
 ) -> None:
     """Draw both panels of the paper's Figure 2 and the curriculum; runs of one learner become median and range."""
-    loaded = [load_run(folder) for path in runs for folder in _run_folders(path)]
+    loaded = [load_run(folder) for path in runs for folder in run_folders(path)]
     single = loaded[0].folder if len(loaded) == 1 else None
     folder = out or (Path("report") if single is None else RunFolder(Path(single)).figures)
     paths = _write_figures(loaded, folder)
@@ -168,15 +168,6 @@ def _write_figures(runs: list[Run], folder: Path) -> list[Path]:
     ]
     paths[-1].write_bytes(msgspec.json.format(msgspec.json.encode(report_of(groups)), indent=2) + b"\n")
     return paths
-
-
-def _run_folders(path: Path) -> list[RunFolder]:
-    """Return the run folder that a path names, or those inside it, in order of their names."""
-    folder = RunFolder(path)
-    if folder.holds_run() or not path.is_dir():
-        return [folder]
-    inside = [RunFolder(entry) for entry in sorted(path.iterdir()) if entry.is_dir()]
-    return [entry for entry in inside if entry.holds_run()] or [folder]
 
 
 def _tell(run: Run, ended: Ended) -> None:

@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence
 from types import TracebackType
 from typing import Self
 
-from rich.console import Console, Group
+from rich.console import Console
 from rich.live import Live
 from rich.progress_bar import ProgressBar
 from rich.table import Table
@@ -137,7 +137,7 @@ class Progress:
         rate = self._epochs.per_s
         return duration_text((self._n_epochs - self._n_done) / rate) if rate else "?"
 
-    def _picture(self) -> Group:
+    def _picture(self) -> Table:
         head = Text.assemble(
             (f"epoch {self._n_done}/{self._n_epochs}", "bold"),
             "  goal ",
@@ -150,7 +150,10 @@ class Progress:
             marks = "".join("█" if hit else "·" for hit in recent)
             share = "" if not recent else f"{_share(recent):4.0%}"
             table.add_row(goal, share, Text(marks, "green"), "" if tested is None else f"tested {tested:.0%}")
-        return Group(head, bar, table)
+        picture = Table.grid()  # a bar on its own would not end its line
+        for part in (head, bar, table):
+            picture.add_row(part)
+        return picture
 
 
 def duration_text(seconds: float) -> str:

@@ -13,7 +13,7 @@ from learning.checkpoint import CheckpointStore, write_atomically
 from learning.errors import RunFolderError
 from learning.rows import EvaluationRow, GoalRow, TrialRow, read_rows
 
-__all__ = ["FORMAT", "GoalInfo", "Manifest", "RunFolder"]
+__all__ = ["FORMAT", "GoalInfo", "Manifest", "RunFolder", "run_folders"]
 
 FORMAT = 1
 CONFIG_NAME = "config.yaml"
@@ -151,12 +151,14 @@ class RunFolder:
         try:
             self.path.mkdir(parents=True, exist_ok=True)
             self._lock = (self.path / "lock").open("w")
-            fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError as error:
-            message = f"{self.path} is in use by another process: wait for it, or name another folder by --out"
-            raise RunFolderError(message) from error
         except OSError as error:
             message = f"{self.path}: expected a folder that can be written to, {(error.strerror or str(error)).lower()}"
+            raise RunFolderError(message) from error
+        try:
+            fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError as error:
+            self._lock.close()
+            message = f"{self.path} is in use by another process: wait for it, or name another folder by --out"
             raise RunFolderError(message) from error
         return self
 
@@ -164,6 +166,22 @@ class RunFolder:
         if self._lock is not None:
             self._lock.close()
             self._lock = None
+
+
+def run_folders(path: Path) -> list[RunFolder]:
+    """Return the run folder that a path names, or those inside it in order of their names.
+
+    Raises:
+        RunFolderError: there is none.
+    """
+    folder = RunFolder(path)
+    if folder.holds_run():
+        return [folder]
+    inside = [RunFolder(entry) for entry in sorted(path.iterdir()) if entry.is_dir()] if path.is_dir() else []
+    found = [entry for entry in inside if entry.holds_run()]
+    if not found:
+        raise RunFolderError(f"{path}: expected a run folder or a folder of run folders, found no run.json")
+    return found
 
 
 def _is_left_over(entry: Path) -> bool:

@@ -50,6 +50,7 @@ class Session:
         """
         started_s, manifest, state = self._stopwatch.now_s(), self.manifest, self.state
         learner = self._learner
+        self._stopwatch.lap("start-up")
         pool = EvaluationPool(
             tester=build_agent(self._resolved, learner.station.spec, seed=manifest.seed),
             station=learner.station,

@@ -1,0 +1,87 @@
+"""The bench of learning: figures of merit of the newest run, or of the run or sweep given."""
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from statistics import median
+from time import perf_counter
+
+import typer
+
+from learning.errors import LearningError
+from learning.metrics import EraSummary
+from learning.report import Run, load_run
+from learning.run_folder import RunFolder, run_folders
+from robot.bench import BenchReport, BenchResult, bench_report
+
+__all__ = ["bench_learning", "learning_results"]
+
+RUNS = Path("runs")
+LEARN_GOAL, RECOVER_GOAL, GRAPH_GOAL = 150, 100, 60
+TRIALS_GOAL, SUCCESS_GOAL = 0.2, 0.98
+
+
+def bench_learning(*, full: bool, run: Path | None = None) -> BenchReport:
+    """Return the figures of a run folder, or of all runs in a folder; nothing is learnt here, full or not."""
+    del full
+    started_s = perf_counter()
+    try:
+        runs = [load_run(folder) for folder in run_folders(run or _newest())]
+    except LearningError as error:
+        raise typer.BadParameter(str(error), param_hint="RUN") from error
+    return bench_report("learning", learning_results(runs), seconds=perf_counter() - started_s)
+
+
+def learning_results(runs: Sequence[Run]) -> list[BenchResult]:
+    """Return the rows: medians over runs, goals asked of the worst run. What was not reached is not a number."""
+    firsts = [run.summary.eras[0] for run in runs if run.summary.eras]
+    laters = [era for run in runs for era in run.summary.eras[1:]]
+    return [
+        _row("runs", [float(len(runs))], "runs"),
+        _row("epoch_all_goals", [era.learnt_after for era in firsts], "epochs", at_most=LEARN_GOAL),
+        _row("epochs_to_recover", [era.learnt_after for era in laters], "epochs", at_most=RECOVER_GOAL),
+        _row("trials_over_optimum", [_excess(era) for era in (*firsts, *laters)], "trials", at_most=TRIALS_GOAL),
+        _row("success_at_end", [_success(era) for era in (*firsts, *laters)], "share", at_least=SUCCESS_GOAL),
+        _row("time_steps_to_all", [run.summary.time_steps_to_all for run in runs], "decisions"),
+        _row("graph_right_after_epochs", [era.graph_right_after for era in laters], "epochs", at_most=GRAPH_GOAL),
+    ]
+
+
+def _excess(era: EraSummary) -> float | None:
+    """Greatest mean excess over the optimum of any goal."""
+    excess = [n - best for n, best in zip(era.trials_by_goal, era.optimal_by_goal, strict=True) if n and best]
+    return max(excess) if len(excess) == len([best for best in era.optimal_by_goal if best]) else None
+
+
+def _success(era: EraSummary) -> float | None:
+    """Success over all goals at the end of an era."""
+    shares = [share for share in era.success_by_goal if share is not None]
+    return sum(shares) / len(shares) if shares else None
+
+
+def _row(
+    name: str,
+    values: Sequence[float | None],
+    unit: str,
+    *,
+    at_most: float | None = None,
+    at_least: float | None = None,
+) -> BenchResult:
+    known = [value for value in values if value is not None]
+    is_reached = bool(values) and len(known) == len(values)
+    ok = is_reached or (at_most is None and at_least is None)
+    if at_most is not None:
+        ok = is_reached and max(known) <= at_most
+    if at_least is not None:
+        ok = is_reached and min(known) >= at_least
+    goal = "" if at_most is None else f"<= {at_most:g}"
+    goal = goal if at_least is None else f">= {at_least:g}"
+    return BenchResult(name=name, value=median(known) if known else math.nan, unit=unit, goal=goal, ok=ok)
+
+
+def _newest() -> Path:
+    """Return the run folder under runs/ that was begun last."""
+    folders = [path.parent for path in RUNS.glob("**/run.json") if RunFolder(path.parent).holds_run()]
+    if not folders:
+        raise typer.BadParameter(f"expected a run folder, there is none under {RUNS}/", param_hint="RUN")
+    return max(folders, key=lambda folder: (folder / "run.json").stat().st_mtime_ns)

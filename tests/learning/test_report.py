@@ -1,0 +1,127 @@
+"""Runs side by side: figures of merit by hand, and pictures that hold what they should."""
+
+import math
+
+import msgspec
+import pytest
+
+from learning.bench import learning_results
+from learning.errors import RunFolderError
+from learning.figures import curriculum_figure, performance_figure, save, styles
+from learning.report import Report, count, group_runs, load_run, report_of
+from learning.telling import report_table, summary_lines
+from tests.support.toy_folder import make_toy_folder, toy_manifest
+
+
+@pytest.fixture(scope="module")
+def runs(tmp_path_factory):
+    """Two seeds of one learner and one of another."""
+    root = tmp_path_factory.mktemp("runs")
+    names = (("a", 5, "toy"), ("b", 6, "toy"), ("c", 5, "other"))
+    return [load_run(make_toy_folder(root / name, seed=seed, learner=learner)) for name, seed, learner in names]
+
+
+def with_manifest(run, **changes):
+    return msgspec.structs.replace(run, manifest=msgspec.structs.replace(run.manifest, **changes))
+
+
+def with_era(run, index, **changes):
+    eras = list(run.summary.eras)
+    eras[index] = msgspec.structs.replace(eras[index], **changes)
+    return msgspec.structs.replace(run, summary=msgspec.structs.replace(run.summary, eras=tuple(eras)))
+
+
+def test_runs_are_grouped_by_learner_in_the_order_they_came(runs):
+    groups = group_runs(runs)
+    assert [(group.name, [run.manifest.seed for run in group.runs]) for group in groups] == [
+        ("toy", [5, 6]),
+        ("other", [5]),
+    ]
+    mixed = group_runs([runs[0], with_manifest(runs[2], scenario="lights")])
+    assert [group.name for group in mixed] == ["toy, lamps", "other, lights"]
+
+
+def test_runs_of_one_learner_with_other_changes_are_refused(runs):
+    with pytest.raises(RunFolderError, match="expected the goals and changes"):
+        group_runs([runs[0], with_manifest(runs[1], changes=(30,))])
+
+
+def test_figures_over_runs_are_median_and_range(runs):
+    first, second = (with_era(run, 0, learnt_after=after) for run, after in zip(runs[:2], (10, 30), strict=True))
+    era = report_of(group_runs([first, second])).groups[0].eras[0]
+    assert (era.learnt_after.median, era.learnt_after.least, era.learnt_after.greatest) == (20, 10, 30)
+    assert (era.learnt.n, era.learnt.of) == (2, 2)
+    never = report_of(group_runs([with_era(first, 0, learnt_after=None), second])).groups[0].eras[0]
+    assert (never.learnt.n, never.learnt.of, never.learnt_after.of) == (1, 2, 1)
+
+
+def test_wilsons_interval_of_five_in_five_and_none_in_ten():
+    five = count(5, 5)
+    assert (five.share_low, five.share_high) == (pytest.approx(0.5655, abs=1e-4), 1.0)
+    none = count(0, 10)
+    assert (none.share_low, none.share_high) == (0.0, pytest.approx(0.2775, abs=1e-4))
+    assert (count(0, 0).share_low, count(0, 0).share_high) == (0.0, 1.0)
+
+
+def test_a_report_reads_back_from_its_json(runs):
+    report = report_of(group_runs(runs))
+    assert msgspec.json.decode(msgspec.json.encode(report), type=Report) == report
+
+
+def test_the_performance_figure_holds_every_goal_in_both_panels_and_marks_the_change(runs):
+    groups = group_runs(runs)
+    figure = performance_figure(groups)
+    panels = figure.get_axes()
+    assert len(panels) == 2 * len(groups)
+    for panel in panels:
+        goal_lines = [line for line in panel.get_lines() if line.get_label().startswith("lamp")]
+        assert len(goal_lines) == 4
+        assert any(list(line.get_xdata()) == [60, 60] for line in panel.get_lines())
+    shown = panels[0].get_lines()
+    last = next(line for line in shown if line.get_label() == "lamp 0")
+    assert last.get_ydata()[-1] == runs[0].evaluation_rows[-4].success
+
+
+def test_every_goal_is_told_apart_by_colour_and_by_dash_or_marker():
+    drawn = styles(toy_manifest().goals)
+    assert len({style.colour for style in drawn}) == len(drawn)
+    assert len({(style.dash, style.marker) for style in drawn}) == len(drawn)
+    assert drawn[0].colour == pytest.approx((0.95, 0.5, 0.08), abs=0.05)
+
+
+def test_figures_are_written_in_every_format_with_the_same_bytes_each_time(runs, tmp_path):
+    groups = group_runs(runs)
+    for name, make in (("figure2", performance_figure), ("curriculum", curriculum_figure)):
+        first = [path.read_bytes() for path in save(make(groups), tmp_path / "one", name)]
+        again = [path.read_bytes() for path in save(make(groups), tmp_path / "two", name)]
+        assert [path.suffix for path in save(make(groups), tmp_path / "one", name)] == [".png", ".pdf"]
+        assert first == again
+
+
+def test_a_run_that_has_only_begun_can_be_drawn(runs, tmp_path):
+    begun = msgspec.structs.replace(runs[0], goal_rows=(), evaluation_rows=())
+    save(performance_figure(group_runs([begun])), tmp_path, "figure2")
+    save(curriculum_figure(group_runs([begun])), tmp_path, "curriculum")
+
+
+def test_words_say_what_was_reached_and_what_was_not(runs):
+    run = with_era(runs[0], 1, learnt_after=None, graph_right_after=20, trials_over_optimum=0.125)
+    lines = list(summary_lines(run))
+    assert "120 epochs" in lines[0]
+    assert "learnt after" in lines[1]
+    assert "rules changed at epoch 60: recovered not yet, graph right after 20" in lines[2]
+    assert "0.12 trials over the optimum" in lines[2]
+    assert report_table(report_of(group_runs(runs))).row_count == 4
+
+
+def test_bench_rows_ask_the_goal_of_the_worst_run(runs):
+    good = [with_era(with_era(run, 0, learnt_after=40), 1, learnt_after=50, graph_right_after=30) for run in runs]
+    rows = {row.name: row for row in learning_results(good)}
+    assert (rows["epoch_all_goals"].value, rows["epoch_all_goals"].ok) == (40, True)
+    assert (rows["epochs_to_recover"].value, rows["epochs_to_recover"].goal) == (50, "<= 100")
+    slow = [*good[:2], with_era(good[2], 1, learnt_after=101)]
+    assert not {row.name: row for row in learning_results(slow)}["epochs_to_recover"].ok
+    never = [*good[:2], with_era(good[2], 1, graph_right_after=None)]
+    row = {row.name: row for row in learning_results(never)}["graph_right_after_epochs"]
+    assert (row.value, row.ok) == (30, False)
+    assert math.isnan({row.name: row for row in learning_results([])}["epoch_all_goals"].value)
