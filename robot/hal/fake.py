@@ -67,7 +67,7 @@ class FakeArm:
         self._arm, self._tick_s = arm, tick_s
         self._chain = ToolChain(arm)
         lag = lag_s(lookahead_s=servo.lookahead_s, gain=servo.gain, dead_time_s=servo.dead_time_s)
-        self._share = 1.0 - math.exp(-tick_s / lag)
+        self._share = 1.0 - math.exp(-tick_s / max(lag - tick_s / 2, 1e-9))  # a held set-point adds half a tick
         self._is_connected = False
         self.digital_in = 0
         self.force_n: Vec3 = (0.0, 0.0, 0.0)
