@@ -48,7 +48,7 @@ class Session:
             n_workers: evaluation processes beside this one.
             should_stop: asked at each epoch's end.
         """
-        started_s, manifest, state = self._stopwatch.now_s(), self.manifest, self.state
+        manifest, state = self.manifest, self.state
         learner = self._learner
         self._stopwatch.lap("start-up")
         pool = EvaluationPool(
@@ -76,7 +76,7 @@ class Session:
         return Ended(
             n_done=n_done,
             n_epochs=manifest.n_epochs,
-            seconds=self._stopwatch.now_s() - started_s,
+            seconds=self._stopwatch.now_s() - self._stopwatch.started_s,
             n_decisions=progress.n_steps,
             seconds_by_layer=dict(self._stopwatch.seconds_by_layer),
         )

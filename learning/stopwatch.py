@@ -16,7 +16,7 @@ class Stopwatch:
     def __init__(self, now_s: Callable[[], float] = _standing_still) -> None:
         self.now_s = now_s
         self.seconds_by_layer: dict[str, float] = {}
-        self._last_s = now_s()
+        self.started_s = self._last_s = now_s()
         self._booked_to: str | None = None
 
     def lap(self, layer: str) -> None:

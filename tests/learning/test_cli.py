@@ -1,0 +1,196 @@
+"""The learning commands as a person meets them: run folders, errors in one line, exit codes."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from learning.metrics import Summary
+from learning.report import Report
+from learning.rows import EvaluationRow
+from learning.run_folder import RunFolder
+from robot.cli import app
+from tests.support.toy_folder import make_toy_folder
+
+FILES = ("config.yaml", "evaluations.csv", "goals.csv", "profile.json", "run.json", "summary.json", "trials.csv")
+
+
+def autotelic(*arguments):
+    return CliRunner().invoke(app, [str(argument) for argument in arguments])
+
+
+def learn(out, *arguments):
+    return autotelic("learn", "--rig", "fake", "--preset", "fast.yaml", "--workers", "0", "--out", out, *arguments)
+
+
+@pytest.fixture(scope="module", autouse=True)
+def folder(tmp_path_factory):
+    """A working folder with a quick learner in it."""
+    path = tmp_path_factory.mktemp("work")
+    (path / "fast.yaml").write_text(
+        "name: fast\n"
+        "experiment: {epochs: 4, trials: 2, steps: 5, evaluate_every: 2, test_epochs: 1, checkpoint_every: 1}\n"
+    )
+    before = Path.cwd()
+    os.chdir(path)
+    yield path
+    os.chdir(before)
+
+
+@pytest.fixture(scope="module")
+def run(folder):
+    """A finished run."""
+    done = learn("done", "--json")
+    assert done.exit_code == 0, done.output
+    return folder / "done", done
+
+
+def lines(done):
+    return (done.stderr or done.output).strip().splitlines()
+
+
+def test_learn_leaves_a_whole_run_folder_and_prints_its_summary(run):
+    path, done = run
+    assert sorted(entry.name for entry in path.iterdir() if entry.is_file() and entry.name != "lock") == sorted(FILES)
+    assert sorted(entry.name for entry in (path / "figures").iterdir()) == [
+        "curriculum.pdf", "curriculum.png", "figure2.pdf", "figure2.png", "summary.json",
+    ]  # fmt: skip
+    summary = json.loads(done.stdout)
+    assert summary == json.loads((path / "summary.json").read_text())
+    assert summary["n_epochs"] == 4
+    assert set(summary) == set(Summary.__struct_fields__)
+
+
+def test_the_profile_tells_where_the_time_went(run):
+    profile = json.loads((run[0] / "profile.json").read_text())
+    assert {"physics", "stack", "experts", "selectors", "training", "evaluation"} <= set(profile["seconds_by_layer"])
+    assert sum(profile["seconds_by_layer"].values()) == pytest.approx(profile["seconds"], rel=0.05)
+
+
+def test_a_second_start_is_refused_and_resuming_a_finished_run_is_done_at_once(run):
+    again = learn("done")
+    assert again.exit_code == 2
+    assert lines(again) == [
+        "error: done holds a run already: go on with it by --resume, or name another folder by --out"
+    ]
+    trials = (run[0] / "trials.csv").read_bytes()
+    resumed = learn("done", "--resume")
+    assert resumed.exit_code == 0, resumed.output
+    assert (run[0] / "trials.csv").read_bytes() == trials
+
+
+def test_resume_begins_a_run_where_there_is_none(folder):
+    assert learn("fresh", "--resume", "--epochs", 1).exit_code == 0
+    assert RunFolder(folder / "fresh").manifest().n_epochs == 1
+
+
+def test_resuming_with_another_seed_is_refused(run):
+    done = learn("done", "--resume", "--seed", 9)
+    assert done.exit_code == 2
+    assert "another --seed" in lines(done)[-1]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (("learn", "--scenario", "papr", "--out", "x"), "papr"),
+        (("learn", "--epochs", "0"), "--epochs"),
+        (("report", "absent"), "error: absent: expected a run folder"),
+        (("evaluate", "absent"), "error: absent: expected a run folder"),
+        (("explain", "absent"), "error: absent: expected a run folder"),
+        (("bench", "learning", "absent"), "absent"),
+    ],
+)
+def test_bad_usage_is_told_in_words_with_exit_code_2(arguments, told):
+    done = autotelic(*arguments)
+    assert done.exit_code == 2
+    assert told in done.output
+    assert "Traceback" not in done.output
+
+
+def test_evaluate_gives_what_the_runs_own_evaluation_gave(run):
+    done = autotelic("evaluate", "done", "--tests", 1, "--json")
+    assert done.exit_code == 0, done.output
+    rows = json.loads(done.stdout)["rows"]
+    own = [row for row in RunFolder(run[0]).evaluations() if row.epoch == 4]
+    assert [EvaluationRow(**row) for row in rows] == own
+    table = autotelic("evaluate", "done", "--tests", 1, "--seed", 5)
+    assert table.exit_code == 0
+    assert "red_grabbed" in table.stdout
+
+
+def test_evaluate_without_a_checkpoint_fails_in_one_line(run, tmp_path):
+    for name in ("config.yaml", "run.json"):
+        (tmp_path / name).write_bytes((run[0] / name).read_bytes())
+    done = autotelic("evaluate", tmp_path)
+    assert done.exit_code == 1
+    assert lines(done)[-1].startswith("error: no readable checkpoint")
+
+
+def test_report_compares_runs_and_writes_where_it_is_told(folder, tmp_path):
+    for name, seed, learner in (("a", 5, "toy"), ("b", 6, "toy"), ("c", 5, "other")):
+        make_toy_folder(tmp_path / "sweep" / name, seed=seed, learner=learner)
+    done = autotelic("report", tmp_path / "sweep", "--out", tmp_path / "out", "--json")
+    assert done.exit_code == 0, done.output
+    report = json.loads(done.stdout)
+    assert set(report) == set(Report.__struct_fields__)
+    assert [(group["name"], group["seeds"]) for group in report["groups"]] == [("toy", [5, 6]), ("other", [5])]
+    assert (tmp_path / "out" / "figure2.png").is_file()
+    table = autotelic("report", tmp_path / "sweep" / "a")
+    assert table.exit_code == 0
+    assert (tmp_path / "sweep" / "a" / "figures" / "figure2.pdf").is_file()
+
+
+def test_the_bench_reads_the_run_given_or_the_newest(folder, tmp_path):
+    make_toy_folder(tmp_path / "run", seed=5)
+    done = autotelic("bench", "learning", tmp_path / "run", "--json")
+    names = [row["name"] for row in json.loads(done.stdout)["results"]]
+    assert {"epoch_all_goals", "epochs_to_recover", "trials_over_optimum", "time_steps_to_all"} <= set(names)
+    none = autotelic("bench", "learning")
+    assert none.exit_code == 2
+    make_toy_folder(folder / "runs" / "newest", seed=5)
+    newest = autotelic("bench", "learning", "--json")
+    assert json.loads(newest.stdout)["results"] == json.loads(done.stdout)["results"]
+
+
+def test_ctrl_c_stops_at_an_epochs_end_and_resuming_gives_the_uninterrupted_run(run, folder):
+    command = [
+        sys.executable,
+        "-m",
+        "learning.main",
+        "learn",
+        "--rig",
+        "fake",
+        "--preset",
+        "fast.yaml",
+        "--workers",
+        "1",
+    ]
+    command = [sys.executable, "-c", "from robot.cli import main; main()", *command[3:]]
+    long = ["--epochs", "60", "--seed", "0"]
+    with subprocess.Popen(
+        [*command, *long, "--out", "stopped"], cwd=folder, stderr=subprocess.PIPE, text=True
+    ) as process:
+        goals = folder / "stopped" / "goals.csv"
+        while not goals.exists() or len(goals.read_bytes().splitlines()) < 4:
+            assert process.poll() is None
+            time.sleep(0.01)
+        process.send_signal(signal.SIGINT)
+        _, said = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert "stopping after this epoch" in said
+    assert "go on with: autotelic learn --resume --out stopped" in said
+    n_done = len(goals.read_bytes().splitlines()) - 1
+    assert 3 <= n_done < 60
+    resumed = autotelic("learn", "--resume", "--out", "stopped")
+    assert resumed.exit_code == 0, resumed.output
+    whole = learn("unbroken", *long)
+    assert whole.exit_code == 0
+    for name in ("trials.csv", "goals.csv", "evaluations.csv"):
+        assert (folder / "stopped" / name).read_bytes() == (folder / "unbroken" / name).read_bytes()
