@@ -45,6 +45,8 @@ class ToolChain:
         self._tcp = arm.tool.tcp_m
         x, y, z = arm.tool.tcp_m
         self._tip = (x, y, z + arm.tool.tip_below_tcp_m)
+        self._tip_m = arm.tool.tip_below_tcp_m
+        self._finger_m = arm.tool.stroke_m / 2 + arm.tool.pad_size_m[0]
 
     def tcp(self, q_rad: Vec6) -> Vec3:
         """Return the tool centre point for joint angles, base frame, metres."""
@@ -70,6 +72,15 @@ class ToolChain:
             u, v = tx + a, ca * ty - sa * tz
             tx, ty, tz = c * u - s * v, s * u + c * v, sa * ty + ca * tz + d
         return (x, y, z), (tx, ty, tz)
+
+    def tcp_and_lowest(self, q_rad: Vec6) -> tuple[Vec3, float]:
+        """Return the tool centre point and the height of the lowest fingertip of an open hand, base frame, metres.
+
+        A tilted tool's lower finger hangs below the point between the tips by its reach times the sine of the tilt.
+        """
+        tcp, tip = self.tcp_and_tip(q_rad)
+        cosine = (tcp[2] - tip[2]) / self._tip_m
+        return tcp, tip[2] - self._finger_m * math.sqrt(max(0.0, 1.0 - cosine * cosine))
 
     def quat(self, q_rad: Vec6) -> Quat:
         """Return the tool's turn, scalar first: the product of Rz(q_i) Rx(alpha_i) as unit quaternions."""

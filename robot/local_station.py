@@ -10,7 +10,7 @@ from config.rig import Rig
 from config.rules import RuleSet
 from config.scenario import Scenario
 from robot.cell import Cell
-from robot.errors import RobotConfigError, StaleStateError
+from robot.errors import RobotConfigError, WireError
 from robot.hal.protocols import Plant
 from robot.kinematics import ToolChain
 from robot.messages import (
@@ -209,7 +209,7 @@ class LocalStation:
             if verdict is None:
                 arm.clock.wait_tick()
                 self._state = arm.read()
-        except StaleStateError as error:
+        except WireError as error:
             return gate.latch(Reason.STALE_STATE, str(error), now_ns=now_ns)
         return verdict
 

@@ -47,6 +47,7 @@ class FakeArm:
         force_n: Force on the tool as read.
         held_opening_m: Opening at which the jaws meet something, None where nothing lies between them.
         mode: What the arm says of itself.
+        is_silent: No state comes any more.
         n_stops: How often it was stopped.
         n_commands: How many commands it was sent.
     """
@@ -73,6 +74,7 @@ class FakeArm:
         self.force_n: Vec3 = (0.0, 0.0, 0.0)
         self.held_opening_m: float | None = None
         self.mode = ArmMode.RUNNING
+        self.is_silent = False
         self.n_stops = 0
         self.n_commands = 0
         self.put(arm.home_rad, digital_out=0)
@@ -95,6 +97,8 @@ class FakeArm:
         """Return the state after the last tick."""
         if not self._is_connected:
             raise StaleStateError("fake arm: expected connect() before read(); nothing was read")
+        if self.is_silent:
+            raise StaleStateError("fake arm: expected a state each tick, none came; it was silenced")
         q = _vec6(self._q)
         held = self.held_opening_m
         return ArmState(

@@ -65,13 +65,17 @@ class Follower:
         self.trouble: str | None = None
         self.target_m = self._kinematics.tcp(q_rad)
         self.yaw_rad = self._home_yaw_rad
-        self._is_upright = False
+        self._is_upright = self._is_solved = False
         self._joints.seed(list(q_rad))
         self._take_up_tool()
 
     def tcp(self, q_rad: Vec6) -> Vec3:
         """Return the tool centre point for joint angles, base frame, metres."""
         return self._kinematics.tcp(q_rad)
+
+    def tcp_and_lowest(self, q_rad: Vec6) -> tuple[Vec3, float]:
+        """Return the tool centre point and the height of the lowest fingertip, base frame, metres."""
+        return self._kinematics.chain.tcp_and_lowest(q_rad)
 
     @property
     def joint_target_rad(self) -> Vec6:
@@ -113,7 +117,11 @@ class Follower:
         return q
 
     def _step_tool(self) -> Vec6:
-        x, y, z, yaw = self._tool.step()
+        before, now = self._tool.at, self._tool.step()
+        if now == before and self._is_solved:
+            return self.q_rad  # at rest: solving again would stir the last digits
+        self._is_solved = True
+        x, y, z, yaw = now
         ahead = _between(self._q_before_rad, self.q_rad, 2.0)
         try:
             q = self._kinematics.solve((x, y, z), ahead, yaw_rad=yaw)
@@ -152,6 +160,7 @@ class Follower:
         self._q_before_rad = self.q_rad
         self.target_m, self.yaw_rad = self._kinematics.tcp(self.q_rad), yaw
         self._tool.seed([*self.target_m, yaw])
+        self._is_solved = False
 
     def _take_up_joints(self) -> None:
         """Go on by the joints, from where they are and as fast as they go."""

@@ -37,7 +37,8 @@ class Limiter:
         self._next = ruckig.OutputParameter(self._n)
         self._put(at, speed or self._rest, self._rest)
         self._now.target_velocity = self._now.target_acceleration = self._rest
-        self.aim(at)
+        self._now.target_position = self._target = at
+        self._is_resting = self.is_failed = False
 
     @property
     def at(self) -> list[float]:
@@ -56,8 +57,11 @@ class Limiter:
 
     def aim(self, target: list[float]) -> None:
         """Set where to rest.  (n,)"""
+        if target == self._target:
+            return
         self._target = target
         self._now.target_position = target
+        self._is_resting = False
         self.is_failed = False
 
     def brake(self) -> list[float]:
@@ -79,6 +83,8 @@ class Limiter:
 
     def step(self) -> list[float]:
         """Advance by one tick and return where the axes are set to.  () -> (n,)"""
+        if self._is_resting:
+            return self._target
         try:
             result = self._otg.update(self._now, self._next)
         except ruckig.RuckigError:
@@ -86,6 +92,10 @@ class Limiter:
         if result not in (ruckig.Result.Working, ruckig.Result.Finished):
             return self._brake_by_hand()
         self._next.pass_to_input(self._now)
+        if result == ruckig.Result.Finished:
+            self._put(self._target, self._rest, self._rest)  # to the last digit, so that rest is rest
+            self._is_resting = True
+            return self._target
         return self._next.new_position
 
     def _bounded(self) -> ruckig.InputParameter:

@@ -118,9 +118,10 @@ class Mover:
             q = _along(now, change, share)
         if share < 1.0:
             self._limiters.append("max_step")
-        fenced = fence(follower.tcp(q), state.tcp_position_m, limits)
-        if fenced.limiters:
-            self._limiters.extend(fenced.limiters)
+        tcp, lowest_m = follower.tcp_and_lowest(q)
+        fenced = fence(tcp, state.tcp_position_m, limits)
+        if fenced.limiters or lowest_m < limits.tip_min_m:
+            self._limiters.extend(fenced.limiters or ("table",))
             return
         follower.aim_joints(q)
 

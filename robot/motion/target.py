@@ -27,6 +27,8 @@ class TargetLimits(msgspec.Struct, frozen=True, kw_only=True):
     guarded_speed_m_s: float
     heights_m: tuple[float, float]
     table_m: float
+    tip_min_m: float
+    """Lowest that a fingertip is brought."""
     workspace_m: Box3
     """The configured box, its floor raised to where the fingertips are clear of the table."""
 
@@ -35,7 +37,8 @@ class TargetLimits(msgspec.Struct, frozen=True, kw_only=True):
         """Return the limits of an arm over a table of this height."""
         motion = arm.motion
         low, high = motion.workspace_m
-        floor = max(low[2], table_m + arm.tool.tip_below_tcp_m + motion.table_clearance_m + TABLE_MARGIN_M)
+        tip_min_m = table_m + motion.table_clearance_m + TABLE_MARGIN_M
+        floor = max(low[2], tip_min_m + arm.tool.tip_below_tcp_m)
         return cls(
             max_step_m=motion.max_step_m,
             leash_m=motion.leash_m,
@@ -43,6 +46,7 @@ class TargetLimits(msgspec.Struct, frozen=True, kw_only=True):
             guarded_speed_m_s=motion.guarded_speed_m_s,
             heights_m=motion.heights_m,
             table_m=table_m,
+            tip_min_m=tip_min_m,
             workspace_m=((low[0], low[1], floor), high),
         )
 

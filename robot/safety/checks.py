@@ -174,17 +174,14 @@ def check_joint_speed(q_rad: Vec6, previous_rad: Vec6, limits: GateLimits) -> Re
 
 def check_tool(q_rad: Vec6, chain: ToolChain, limits: GateLimits) -> Refusal | None:
     """Refuse joints that bring the tool centre point out of the workspace or a fingertip too near the table."""
-    tcp, tip = chain.tcp_and_tip(q_rad)
+    tcp, lowest_m = chain.tcp_and_lowest(q_rad)
     low, high = limits.workspace_m
     if not inside_box(tcp, low, high):
         by = max(max(a - x, x - b) for a, x, b in zip(low, tcp, high, strict=True))
         return Refusal(Reason.WORKSPACE, f"expected the tool within {low} to {high} m, came {_round(tcp)}", by)
-    reach = math.dist(tcp, tip)
-    tilt = math.sqrt(max(0.0, 1.0 - ((tcp[2] - tip[2]) / reach) ** 2))
-    lowest = tip[2] - limits.finger_reach_m * tilt
-    if not lowest >= limits.tip_min_m:
-        detail = f"expected fingertips at {limits.tip_min_m:g} m or higher, came {lowest:g}"
-        return Refusal(Reason.TABLE, detail, limits.tip_min_m - lowest)
+    if not lowest_m >= limits.tip_min_m:
+        detail = f"expected fingertips at {limits.tip_min_m:g} m or higher, came {lowest_m:g}"
+        return Refusal(Reason.TABLE, detail, limits.tip_min_m - lowest_m)
     return None
 
 

@@ -28,8 +28,6 @@ class GateLimits(msgspec.Struct, frozen=True, kw_only=True):
     """Where the commanded tool centre point may be."""
     tip_min_m: float
     """Lowest that a fingertip may be commanded, base frame."""
-    finger_reach_m: float
-    """How far a finger's outer edge is from the tool's axis."""
     tracking_error_rad: float
     force_max_n: float
     """Greatest steady force on the tool."""
@@ -42,7 +40,7 @@ class GateLimits(msgspec.Struct, frozen=True, kw_only=True):
     """Bits of the outputs that the arm has."""
     state_max_age_ns: int
     intent_max_age_ns: int
-    """Age of an intent after which commands must have come to rest: its deadline and the time a stop takes."""
+    """Age of an intent at which commands must have come to rest: its deadline and the time to the end of the leash."""
 
     @classmethod
     def of(cls, arm: ArmConfig, spec: ArmSpec, *, table_m: float, tick_s: float) -> "GateLimits":
@@ -61,14 +59,14 @@ class GateLimits(msgspec.Struct, frozen=True, kw_only=True):
                 raise RobotConfigError(f"joint {joint.name}: file and arm leave no range ({a} .. {b} rad)")
         speeds = tuple(min(j.speed_rad_s, v) for j, v in zip(arm.joints, spec.qd_max_rad_s, strict=True))
         t, (lo, hi) = BOW_M, motion.workspace_m
-        rest_s = max(j.speed_rad_s / j.acceleration_rad_s2 + j.acceleration_rad_s2 / j.jerk_rad_s3 for j in arm.joints)
+        speed, acceleration, jerk = motion.speed_m_s, motion.acceleration_m_s2, motion.jerk_m_s3
+        rest_s = motion.leash_m / speed + speed / acceleration + acceleration / jerk
         return cls(
             q_min_rad=_vec6(low),
             q_max_rad=_vec6(high),
             joint_step_rad=_vec6(tuple(v * tick_s * (1.0 + SPEED_TOLERANCE) for v in speeds)),
             workspace_m=((lo[0] - t, lo[1] - t, lo[2] - FLOOR_BOW_M), (hi[0] + t, hi[1] + t, hi[2] + t)),
             tip_min_m=table_m + motion.table_clearance_m,
-            finger_reach_m=tool.stroke_m / 2 + tool.pad_size_m[0],
             tracking_error_rad=motion.tracking_error_rad,
             force_max_n=motion.force_limit_n,
             impact_max_n=IMPACT_FACTOR * motion.force_limit_n,

@@ -155,12 +155,12 @@ INTENT_AGE = LIMITS.intent_max_age_ns
 
 
 @pytest.mark.parametrize(("age", "passes"), [(-1, False), (0, True), (INTENT_AGE, True), (INTENT_AGE + 1, False)])
-def test_motion_passes_up_to_the_intents_deadline_and_the_time_a_stop_takes(age, passes):
+def test_motion_passes_up_to_the_intents_deadline_and_the_time_to_come_to_rest(age, passes):
     assert (check_intent_age(0, age, LIMITS) is None) is passes
 
 
-def test_the_time_a_stop_takes_is_short():
-    assert LIMITS.intent_max_age_ns - ARM.motion.intent_max_age_s * 1e9 < 0.25e9
+def test_the_time_to_come_to_rest_is_short():
+    assert 0.2e9 < LIMITS.intent_max_age_ns - ARM.motion.intent_max_age_s * 1e9 < 0.5e9
 
 
 STEADY, BLOW = LIMITS.force_max_n, LIMITS.impact_max_n
@@ -227,7 +227,7 @@ def test_a_tilted_tool_keeps_its_lower_finger_clear_too():
     q = tilted_over(z)
     assert CHAIN.tcp_and_tip(q)[1][2] == pytest.approx(LIMITS.tip_min_m + 0.005, abs=1e-3)
     assert reason(check_tool(q, CHAIN, LIMITS)) is Reason.TABLE
-    assert check_tool(tilted_over(z + LIMITS.finger_reach_m), CHAIN, LIMITS) is None
+    assert check_tool(tilted_over(z + 0.05), CHAIN, LIMITS) is None
 
 
 @given(st.tuples(*[st.floats(-6.5, 6.5)] * 6))

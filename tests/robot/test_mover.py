@@ -115,11 +115,9 @@ def test_falling_back_from_a_push_keeps_every_joints_speed(arm):
     mover, measured = arm.mover, arm.q
     path = [arm.q]
     mover.begin_step(go(distance=0.0, height=0.03), arm_state(measured, tcp_m=START), duration_s=0.2)
-    for _ in range(20):
-        path.append(mover.tick(arm_state(measured, tcp_m=START)))
+    path += [mover.tick(arm_state(measured, tcp_m=START)) for _ in range(20)]
     pushed = arm_state(measured, tcp_m=START, force_n=(0.0, 0.0, CONTACT + 1.0))
-    for _ in range(6):
-        path.append(mover.tick(pushed))
+    path += [mover.tick(pushed) for _ in range(6)]
     assert (np.abs(np.diff(path, axis=0)).max(0) <= [DT * j.speed_rad_s for j in ARM.joints]).all()
     assert path[-1] == pytest.approx(measured, abs=2e-3)
 

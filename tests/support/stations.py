@@ -83,7 +83,12 @@ def command(q_rad: Vec6, **changes: object) -> ArmCommand:
 
 
 def percept(
-    positions_m: dict[str, Vec3], *, tcp_m: Vec3, grip: GripState = STILL, stamp_ns: int = 0, is_in_contact: bool = False
+    positions_m: dict[str, Vec3],
+    *,
+    tcp_m: Vec3,
+    grip: GripState = STILL,
+    stamp_ns: int = 0,
+    is_in_contact: bool = False,
 ) -> Percept:
     """Return a percept of things at places."""
     things = tuple(

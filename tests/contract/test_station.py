@@ -1,0 +1,431 @@
+"""One suite over a station on every plant: what a learner, a teleoperator and an operator may rely on."""
+
+import math
+
+import msgspec
+import numpy as np
+import pytest
+
+from config.loader import resolve
+from robot.errors import NotEngagedError, RobotConfigError, SafetyError, StaleStateError
+from robot.local_station import LocalStation
+from robot.messages import (
+    ArmMode,
+    Grip,
+    GripState,
+    Heading,
+    Hold,
+    JointTarget,
+    Outcome,
+    PlantIdentity,
+    PlantKind,
+    StationMode,
+    Twist,
+)
+from robot.rigs import build_operator, build_plant, build_station
+from robot.safety import Armable, Operator, TooManyLatchesError
+from robot.station import Station
+from sim_twin.operator import SimulatedOperator
+
+STATIONS: tuple[type[Station], ...] = (LocalStation,)
+ARMABLES: tuple[type[Armable], ...] = (LocalStation,)
+OPERATORS: tuple[type[Operator], ...] = (SimulatedOperator,)
+RIGS = ("fake", "twin")
+
+
+@pytest.fixture(scope="module", params=RIGS)
+def resolved(request):
+    return resolve(rig=request.param, scenario="paper", learning="default")
+
+
+def open_station(resolved):
+    """Return a disarmed station, its plant and its operator."""
+    plant = build_plant(rig=resolved.rig, arm=resolved.arm, scenario=resolved.scenario)
+    return build_station(resolved, plant=plant), plant, build_operator(resolved.rig)
+
+
+@pytest.fixture
+def disarmed(resolved):
+    station, _, _ = open_station(resolved)
+    yield station
+    station.close()
+
+
+@pytest.fixture
+def engaged(resolved):
+    station, plant, operator = open_station(resolved)
+    operator.arm_once(station)
+    station.reset(seed=1, epoch=0)
+    yield station, plant, operator
+    station.close()
+
+
+def go(angle=0.0, distance=0.022, height=0.2, **more):
+    return Heading(heading_rad=angle, distance_m=distance, height_m=height, **more)
+
+
+def unstamped(result):
+    """Return a step's result without its stamps: time runs on through resets, the world does not."""
+    percept = msgspec.structs.replace(result.percept, stamp_ns=0)
+    verdicts = tuple(msgspec.structs.replace(v, stamp_ns=0) for v in result.verdicts)
+    return msgspec.structs.replace(result, percept=percept, verdicts=verdicts)
+
+
+def episode(station, *, seed, epoch, n=60):
+    """Run random intents from a reset and return everything that came of it."""
+    rng = np.random.default_rng([seed, epoch, 7])
+    percept = station.reset(seed=seed, epoch=epoch)
+    results = []
+    for k in range(n):
+        if k % 8 == 0:
+            angle, height = rng.uniform(-3.0, 3.0), rng.uniform(0.03, 0.22)
+        results.append(unstamped(station.step(go(angle=angle, height=height))))
+    return msgspec.structs.replace(percept, stamp_ns=0), results
+
+
+# -------------------------------------------------------------------------------------------------------- engaging
+
+
+def test_nothing_moves_before_the_station_is_engaged(disarmed):
+    assert disarmed.state.mode is StationMode.DISARMED
+    with pytest.raises(NotEngagedError):
+        disarmed.reset(seed=1, epoch=0)
+    with pytest.raises(NotEngagedError):
+        disarmed.step(Hold())
+    disarmed.arm(by="tester")
+    assert disarmed.state.mode is StationMode.ARMED
+    with pytest.raises(NotEngagedError):
+        disarmed.step(Hold())
+    disarmed.engage()
+    assert disarmed.state.mode is StationMode.ENGAGED
+    assert not disarmed.step(Hold()).is_void
+
+
+def test_a_plant_that_is_not_the_one_the_rig_names_is_not_armed(resolved):
+    _, plant, operator = open_station(resolved)
+    expected = msgspec.structs.replace(resolved.rig.expected, serial="another")
+    other = msgspec.structs.replace(resolved, rig=msgspec.structs.replace(resolved.rig, expected=expected))
+    station = build_station(other, plant=plant)
+    with pytest.raises(SafetyError, match="another"):
+        operator.arm_once(station)
+    assert station.state.mode is StationMode.DISARMED
+
+
+def test_the_simulated_operator_refuses_a_real_arm(resolved):
+    expected = msgspec.structs.replace(resolved.rig.expected, kind="real")
+    real = msgspec.structs.replace(resolved, rig=msgspec.structs.replace(resolved.rig, expected=expected))
+    plant = build_plant(rig=real.rig, arm=real.arm, scenario=real.scenario)
+    plant.identity = PlantIdentity(kind=PlantKind.REAL, model=plant.identity.model, serial=plant.identity.serial)
+    station = build_station(real, plant=plant)
+    with pytest.raises(SafetyError, match="real arm"):
+        SimulatedOperator().arm_once(station)
+    assert station.state.mode is StationMode.DISARMED
+
+
+def test_closing_disarms_and_can_be_repeated(engaged):
+    station, plant, _ = engaged
+    station.close()
+    station.close()
+    assert station.state.mode is StationMode.DISARMED
+    with pytest.raises(StaleStateError):
+        plant.arm.read()
+
+
+# ----------------------------------------------------------------------------------------------------------- steps
+
+
+def test_a_step_takes_its_time_and_says_what_it_did(engaged, resolved):
+    station, plant, _ = engaged
+    step_ns = round(resolved.arm.motion.step_s * 1e9)
+    before = plant.arm.read()
+    for k in range(1, 6):
+        result = station.step(go(angle=0.5))
+        assert result.percept.stamp_ns == before.stamp_ns + k * step_ns
+        assert result.executed.duration_s == resolved.arm.motion.step_s
+        assert result.verdicts == ()
+        assert not result.is_void
+    moved = np.subtract(result.percept.tcp_position_m, before.tcp_position_m)
+    assert moved @ (math.cos(0.5), math.sin(0.5), 0.0) > 0.03
+
+
+def test_the_parts_of_a_path_add_up_and_it_rests_on_the_target(engaged):
+    station, plant, _ = engaged
+    start = np.array(plant.arm.read().tcp_position_m)
+    results = [station.step(go(angle=1.0)) for _ in range(5)] + [station.step(go(distance=0.0)) for _ in range(15)]
+    total = start + np.sum([r.executed.moved_m for r in results], axis=0)
+    last = results[-1]
+    assert total == pytest.approx(last.percept.tcp_position_m, abs=1e-9)
+    assert last.percept.tcp_position_m == pytest.approx(last.executed.target_m, abs=1e-3)
+
+
+def test_the_tool_trails_the_target_by_one_to_three_steps(engaged):
+    station, _, _ = engaged
+    lags = []
+    for k in range(12):
+        result = station.step(go(angle=0.2 if k < 6 else math.pi))
+        lags.append(math.dist(result.percept.tcp_position_m, result.executed.target_m) / 0.022)
+    assert max(lags) < 4.2  # the leash
+    assert 1.0 < lags[5] < 3.5
+
+
+@pytest.mark.parametrize("duration", [0.0, -0.05, 0.013, math.nan, math.inf, 1e9])
+def test_a_duration_that_is_not_whole_ticks_is_an_error_and_no_latch(engaged, duration):
+    station, _, _ = engaged
+    with pytest.raises(RobotConfigError, match="duration"):
+        station.step(Hold(), duration_s=duration)
+    assert station.state.mode is StationMode.ENGAGED
+
+
+def test_an_intent_grown_old_within_a_long_step_comes_to_rest_unlatched(engaged):
+    station, plant, _ = engaged
+    for _ in range(5):
+        station.step(go())
+    result = station.step(go(), duration_s=3.0)
+    assert not result.is_void
+    assert max(abs(v) for v in plant.arm.read().qd_rad_s) < 5e-3
+    assert result.percept.tcp_position_m == pytest.approx(result.executed.target_m, abs=1e-3)
+
+
+def test_the_percept_counts_what_the_spec_says(engaged):
+    station, _, _ = engaged
+    percept, spec = station.step(Hold()).percept, station.spec
+    assert len(percept.distances_m) == spec.n_distances == len(spec.distance_names)
+    assert len(percept.button_states) == spec.n_buttons
+    assert len(percept.ages_s) == len(percept.valid) == spec.n_distances + spec.n_buttons
+    places = {o.name: o.position_m for o in percept.objects}
+    for name, d in zip(spec.distance_names, percept.distances_m, strict=True):
+        if name == "table":
+            assert d == pytest.approx(percept.tcp_position_m[2] - spec.table_height_m)
+        else:
+            assert d == pytest.approx(math.dist(percept.tcp_position_m, places[name]))
+
+
+def test_the_hand_does_what_an_intent_asks(engaged, resolved):
+    station, _, _ = engaged
+    for _ in range(20):
+        shut = station.step(Hold(grip=Grip.CLOSE))
+    assert shut.percept.grip.opening_m < 0.01
+    for _ in range(20):
+        wide = station.step(Hold(grip=Grip.OPEN))
+    assert wide.percept.grip.opening_m == pytest.approx(resolved.arm.tool.stroke_m, abs=2e-3)
+
+
+# ------------------------------------------------------------------------------------------------------ repeating
+
+
+def test_the_same_seed_is_the_same_episode_bit_for_bit(resolved):
+    runs = []
+    for _ in range(2):
+        station, _, operator = open_station(resolved)
+        operator.arm_once(station)
+        runs.append([episode(station, seed=3, epoch=e) for e in (0, 1)])
+        station.close()
+    assert runs[0] == runs[1]
+
+
+def test_an_epoch_depends_on_nothing_before_its_reset(resolved):
+    through, _, operator = open_station(resolved)
+    operator.arm_once(through)
+    for epoch in (0, 1):
+        episode(through, seed=3, epoch=epoch)
+    straight, _, operator = open_station(resolved)
+    operator.arm_once(straight)
+    assert episode(straight, seed=3, epoch=2) == episode(through, seed=3, epoch=2)
+
+
+def test_an_epoch_after_a_latch_is_the_epoch_that_would_have_been(resolved):
+    station, _, operator = open_station(resolved)
+    operator.arm_once(station)
+    expected = episode(station, seed=3, epoch=2)
+    station.step(go(angle=math.nan))
+    operator.rearm(station, seed=9, epoch=0)
+    assert episode(station, seed=3, epoch=2) == expected
+
+
+# -------------------------------------------------------------------------------------------------------- refusing
+
+
+HOSTILE = [
+    (go(angle=math.nan), "not_finite"),
+    (go(distance=math.inf), "not_finite"),
+    (go(height=-math.inf), "not_finite"),
+    (go(distance=1e12), "out_of_reason"),
+    (go(distance=-0.02), "out_of_reason"),
+    (Twist(linear_m_s=(0.0, math.nan, 0.0)), "not_finite"),
+    (Twist(linear_m_s=(1e5, 0.0, 0.0)), "out_of_reason"),
+    (JointTarget(q_rad=(math.nan,) * 6), "not_finite"),
+    (JointTarget(q_rad=(0.0,) * 5), "malformed"),
+    (JointTarget(q_rad=(1e8,) * 6), "out_of_reason"),
+    (go(distance="far"), "malformed"),
+    ("up", "malformed"),
+    (None, "malformed"),
+]
+
+
+@pytest.mark.parametrize(("intent", "reason"), HOSTILE)
+def test_a_hostile_intent_is_refused_with_a_clear_verdict_and_moves_nothing(engaged, intent, reason):
+    station, plant, _ = engaged
+    for _ in range(3):
+        station.step(Hold())
+    before = plant.arm.read()
+    result = station.step(intent)
+    assert [v.outcome for v in result.verdicts] == [Outcome.REFUSED]
+    assert result.verdicts[0].reason == reason
+    assert "expected" in result.verdicts[0].detail
+    assert result.verdicts[0].is_latched
+    assert result.is_void
+    assert station.state.mode is StationMode.LATCHED
+    assert reason in station.state.reason
+    for _ in range(30):
+        plant.arm.clock.wait_tick()
+    assert plant.arm.read().q_rad == pytest.approx(before.q_rad, abs=2e-3)
+
+
+@pytest.mark.parametrize(
+    "intent",
+    [
+        go(distance=5.0),
+        go(height=9.0),
+        go(height=-9.0),
+        go(angle=500.0),
+        Twist(linear_m_s=(9.0, -9.0, -9.0)),
+        JointTarget(q_rad=(6.0, 6.0, -6.0, 6.0, -6.0, 6.0)),
+    ],
+)
+def test_a_large_intent_is_shaped_and_never_latches(engaged, intent):
+    station, _, _ = engaged
+    for _ in range(30):
+        before = station.step(Hold()).executed.target_m
+        result = station.step(intent)
+        assert result.verdicts == ()
+        assert math.dist(before, result.executed.target_m) <= station.spec.max_step_m * 1.01
+    low, high = station.spec.workspace_m
+    assert all(a - 5e-3 <= x <= b + 5e-3 for a, x, b in zip(low, result.percept.tcp_position_m, high, strict=True))
+
+
+def test_a_latch_is_not_cleared_by_a_reset_but_by_an_operator_after_the_plants(engaged):
+    station, _, operator = engaged
+    station.step(go(angle=math.nan))
+    for attempt in (lambda: station.step(Hold()), lambda: station.reset(seed=1, epoch=1)):
+        with pytest.raises(NotEngagedError, match="not_finite"):
+            attempt()
+    for attempt in (lambda: station.arm(by="tester"), station.engage, lambda: station.clear_latch(by="tester")):
+        with pytest.raises(SafetyError):
+            attempt()
+    assert station.state.mode is StationMode.LATCHED
+    operator.rearm(station, seed=1, epoch=1)
+    assert station.state.mode is StationMode.ENGAGED
+    assert not station.step(go()).is_void
+
+
+def test_after_a_latch_motion_starts_from_rest_at_the_measured_joints(engaged):
+    station, plant, operator = engaged
+    for _ in range(6):
+        station.step(go(angle=0.4))
+    station.step(go(angle=math.nan))
+    operator.rearm(station, seed=1, epoch=1)
+    start = plant.arm.read().tcp_position_m
+    result = station.step(Hold())
+    assert result.executed.target_m == pytest.approx(start, abs=1e-3)
+    assert math.dist(result.percept.tcp_position_m, start) < 1e-3
+
+
+def test_too_many_latches_fail_the_run(resolved):
+    few = msgspec.structs.replace(resolved, rig=msgspec.structs.replace(resolved.rig, max_latches=2))
+    station, _, operator = open_station(few)
+    operator.arm_once(station)
+    for _ in range(2):
+        station.step(go(angle=math.nan))
+        operator.rearm(station, seed=1, epoch=0)
+    station.step(go(angle=math.nan))
+    with pytest.raises(TooManyLatchesError):
+        operator.rearm(station, seed=1, epoch=0)
+    assert station.n_latches == 3
+
+
+# ----------------------------------------------------------------------- what only a plant made for tests can show
+
+
+@pytest.fixture
+def fake():
+    resolved = resolve(rig="fake", scenario="paper", learning="default")
+    station, plant, operator = open_station(resolved)
+    operator.arm_once(station)
+    station.reset(seed=1, epoch=0)
+    yield station, plant, resolved
+    station.close()
+
+
+def test_a_push_latches_and_voids_the_step(fake):
+    station, plant, _ = fake
+    plant.arm.force_n = (0.0, 0.0, 300.0)
+    result = station.step(go())
+    assert result.is_void
+    assert result.verdicts[0].reason == "force"
+
+
+@pytest.mark.parametrize("mode", [ArmMode.PROTECTIVE_STOP, ArmMode.EMERGENCY_STOP, ArmMode.STOPPED, ArmMode.IDLE])
+def test_a_stop_of_the_arm_itself_latches_and_voids_the_step(fake, mode):
+    station, plant, _ = fake
+    plant.arm.mode = mode
+    result = station.step(go())
+    assert result.is_void
+    assert result.verdicts[0].reason == "arm_mode"
+    assert station.state.mode is StationMode.LATCHED
+
+
+def test_an_arm_that_falls_silent_latches_and_voids_the_step(fake):
+    station, plant, _ = fake
+    plant.arm.is_silent = True
+    result = station.step(go())
+    assert result.is_void
+    assert result.verdicts[0].reason == "stale_state"
+    assert plant.arm.n_stops > 0
+
+
+def test_a_held_object_that_is_lost_voids_the_step_without_latching(fake):
+    station, plant, _ = fake
+    plant.arm.held_opening_m = 0.044
+    for _ in range(12):
+        result = station.step(Hold(grip=Grip.CLOSE))
+    assert result.percept.grip.has_object
+    plant.arm.held_opening_m = None
+    results = [station.step(Hold(grip=Grip.CLOSE)) for _ in range(4)]
+    lost = [r for r in results if r.is_void]
+    assert len(lost) == 1
+    assert "object_lost" in lost[0].executed.limiters
+    assert station.state.mode is StationMode.ENGAGED
+
+
+def test_pressing_lights_the_lamp_and_switches_the_lid_and_the_epoch_forgets(fake):
+    station, plant, resolved = fake
+    green, red = resolved.scenario.buttons[1], resolved.scenario.boxes[0]
+    assert station.step(go()).percept.button_states == (0.0, 0.0, 0.0)
+    plant.arm.digital_in = 1 << green.input
+    station.step(go())
+    plant.arm.digital_in = 0
+    assert station.step(go()).percept.button_states == (0.0, 1.0, 0.0)
+    assert plant.arm.read().digital_out & 1 << red.lid.output
+    assert station.reset(seed=1, epoch=1).button_states == (0.0, 0.0, 0.0)
+    assert not plant.arm.read().digital_out & 1 << red.lid.output
+
+
+def test_a_reflex_holds_the_arm_while_the_fingers_move(fake):
+    station, plant, _ = fake
+    x, y, z = plant.arm.read().tcp_position_m
+    plant.truth.move("red_cylinder", (x, y, z - 0.002))
+    plant.arm.held_opening_m = 0.044
+    station.step(Hold())
+    result = station.step(go())
+    assert "hand" in result.executed.limiters
+    assert result.executed.target_m == pytest.approx((x, y, z), abs=1e-3)
+    while "hand" in result.executed.limiters:
+        result = station.step(go())
+    assert result.percept.grip.has_object
+
+
+def test_an_open_hand_in_the_percept_is_the_arms(fake):
+    station, plant, _ = fake
+    grip = station.step(Hold()).percept.grip
+    assert isinstance(grip, GripState)
+    assert grip == plant.arm.read().grip

@@ -1,0 +1,45 @@
+import msgspec
+import pytest
+
+from perception.ground_truth import GroundTruthPerception
+from robot.errors import RobotConfigError
+from robot.hal.fake import FakePlant
+from robot.local_station import LocalStation
+from robot.rigs import build_operator, build_plant, build_station, load
+from sim_twin.operator import SimulatedOperator
+from tests.support.stations import fake_rig
+
+RESOLVED = fake_rig()
+
+
+def test_import_strings_name_what_they_load():
+    assert load("robot.hal.fake:FakePlant") is FakePlant
+    assert load("perception.ground_truth:GroundTruthPerception") is GroundTruthPerception
+
+
+@pytest.mark.parametrize("wrong", ["robot.hal.fake:NoSuchPlant", "no.such.module:Plant", "robot"])
+def test_an_import_string_that_leads_nowhere_is_refused_with_the_string(wrong):
+    with pytest.raises(RobotConfigError, match=wrong):
+        load(wrong)
+
+
+def test_a_rig_becomes_its_plant_and_operator():
+    plant = build_plant(rig=RESOLVED.rig, arm=RESOLVED.arm, scenario=RESOLVED.scenario)
+    assert isinstance(plant, FakePlant)
+    assert isinstance(build_operator(RESOLVED.rig), SimulatedOperator)
+    assert build_operator(msgspec.structs.replace(RESOLVED.rig, operator=None)) is None
+
+
+def test_a_station_is_built_disarmed_and_touches_no_plant():
+    plant = FakePlant(arm=RESOLVED.arm, scenario=RESOLVED.scenario, rig=RESOLVED.rig)
+    station = build_station(RESOLVED, plant=plant)
+    assert isinstance(station, LocalStation)
+    assert station.state.mode == "disarmed"
+    assert plant.arm.n_commands == 0
+
+
+def test_a_plant_with_another_tick_than_the_rig_is_refused():
+    other = msgspec.structs.replace(RESOLVED.rig, tick_s=0.005)
+    plant = FakePlant(arm=RESOLVED.arm, scenario=RESOLVED.scenario, rig=other)
+    with pytest.raises(RobotConfigError, match="tick"):
+        build_station(RESOLVED, plant=plant)
