@@ -10,6 +10,7 @@ import os
 import sys
 import tempfile
 from collections.abc import Iterator
+from operator import le
 from pathlib import Path
 
 import numpy as np
@@ -24,7 +25,9 @@ __all__ = ["Kinematics", "ToolChain", "UnreachableError"]
 
 N_JOINTS = 6
 TOLERANCE = 1e-5
-"""A solution is off by no more than this in any entry of T_bt (metres, and sines of angles)."""
+"""A solution is off by no more than this, in metres."""
+NEAR = 1e-3
+"""A step of the solver that begins this near (metres, radians) ends within tolerance: its error falls as the square."""
 MAX_ITERATIONS = 40
 
 
@@ -102,7 +105,7 @@ class Kinematics:
     def __init__(self, arm: ArmConfig) -> None:
         self.chain = ToolChain(arm)
         self._yaw_rad = arm.tool_yaw_rad
-        self._ranges = tuple(j.range_rad for j in arm.joints)
+        self._low_rad, self._high_rad = zip(*(j.range_rad for j in arm.joints), strict=True)
         self._robot = _load(arm)
         self._offset = self._robot.get_joint_offset(arm.joints[0].name)
         self._rest_q = np.zeros(len(self._robot.state.q))
@@ -119,6 +122,7 @@ class Kinematics:
         self._yaw_now_rad = self._yaw_rad
         self._task = self._solver.add_frame_task("tcp", self._T_bt)
         self._task.configure("tcp", "soft", 1.0, 1.0)
+        self._position, self._orientation = self._task.position(), self._task.orientation()
 
     def tcp(self, q_rad: Vec6) -> Vec3:
         """Return the tool centre point for joint angles, base frame, metres."""
@@ -141,28 +145,31 @@ class Kinematics:
         q = self._rest_q.copy()
         q[lo : lo + N_JOINTS] = seed_rad
         robot.state.q = q
-        robot.update_kinematics()
         self._task.T_world_frame = T_bt
-        residual = self._iterate()
+        is_solved = self._iterate()
         x = robot.state.q[lo : lo + N_JOINTS].tolist()
-        if residual > TOLERANCE or not all(low <= v <= high for v, (low, high) in zip(x, self._ranges, strict=True)):
-            raise UnreachableError(f"no joint angles within range reach {position_m} m (residual {residual:.2g})")
-        return x[0], x[1], x[2], x[3], x[4], x[5]
+        solution: Vec6 = (x[0], x[1], x[2], x[3], x[4], x[5])
+        # Asked this way round, what is not a number is no solution either.
+        if is_solved and math.dist(self.chain.tcp(solution), position_m) <= TOLERANCE and self._allows(x):
+            return solution
+        raise UnreachableError(f"no joint angles within range reach {position_m} m with the tool pointing down")
 
-    def _iterate(self) -> float:
-        """Run the solver to tolerance and return what is left of the error."""
-        robot, solver, T_bt = self._robot, self._solver, self._T_bt
-        residual = math.inf
+    def _iterate(self) -> bool:
+        """Run the solver until a step began so near that it ended within tolerance; whether it got there."""
+        robot, solver = self._robot, self._solver
         for _ in range(MAX_ITERATIONS):
+            robot.update_kinematics()
             try:
                 solver.solve(True)
             except RuntimeError:  # placo's QPError: a seed outside the joint ranges has no feasible step
-                return math.inf
-            robot.update_kinematics()
-            residual = float(np.abs(robot.get_T_world_frame("tcp") - T_bt).max())
-            if residual < TOLERANCE or not math.isfinite(residual):
-                break
-        return residual
+                return False
+            # These are the errors that the step began with; it leaves about their square.
+            if self._position.error_norm() < NEAR and self._orientation.error_norm() < NEAR:
+                return True
+        return False
+
+    def _allows(self, q_rad: list[float]) -> bool:
+        return all(map(le, self._low_rad, q_rad)) and all(map(le, q_rad, self._high_rad))
 
     def _set_yaw(self, yaw_rad: float) -> None:
         if yaw_rad != self._yaw_now_rad:
