@@ -94,7 +94,9 @@ class MotionLimits(Section, frozen=True, kw_only=True):
     state_max_age_s: Positive = 0.05
     tracking_error_rad: Positive = 0.25
     force_limit_n: Positive = 250.0
-    """Measured force on the tool above which the gate refuses."""
+    """Measured force on the tool that the gate refuses when it lasts longer than one tick."""
+    impact_limit_n: Positive = 700.0
+    """Measured force on the tool that the gate refuses at once; in a blow motion needs one tick to give way."""
 
 
 class ArmConfig(Section, frozen=True, kw_only=True):

@@ -113,6 +113,12 @@ def _check_motion(arm: ArmConfig, checker: _Checker) -> None:
         f"less than force_limit_n = {motion.force_limit_n:g}",
         f"{motion.contact_force_n:g}",
     )
+    checker.need(
+        motion.force_limit_n <= motion.impact_limit_n,
+        "motion.impact_limit_n",
+        f"at least force_limit_n = {motion.force_limit_n:g}",
+        f"{motion.impact_limit_n:g}",
+    )
 
 
 def check_rig(rig: Rig, file: str) -> None:

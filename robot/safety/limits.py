@@ -8,13 +8,11 @@ from robot.messages import ArmSpec, Box3, Vec6
 
 __all__ = ["GateLimits"]
 
-BOW_M = 0.02
-"""Joint-space motion between two targets inside the box bows out of it: by 6 mm on a 9 cm leash at full speed."""
+BOW_M = 0.01
+"""Headings move the tool straight; towards joint targets it bows out, by up to 6 mm on a leash of 9 cm."""
 FLOOR_BOW_M = 0.005
 """Near the table motion is guarded and bows less."""
 SPEED_TOLERANCE = 1e-9
-IMPACT_FACTOR = 2.0
-"""ISO/TS 15066 allows a body twice the force in a blow that it allows in a steady push (hand: 280 N and 140 N)."""
 
 
 class GateLimits(msgspec.Struct, frozen=True, kw_only=True):
@@ -69,7 +67,7 @@ class GateLimits(msgspec.Struct, frozen=True, kw_only=True):
             tip_min_m=table_m + motion.table_clearance_m,
             tracking_error_rad=motion.tracking_error_rad,
             force_max_n=motion.force_limit_n,
-            impact_max_n=IMPACT_FACTOR * motion.force_limit_n,
+            impact_max_n=motion.impact_limit_n,
             opening_m=(0.0, min(tool.stroke_m, spec.grip_stroke_m)),
             grip_force_n=tool.force_n,
             grip_speed_m_s=tool.speed_m_s,
