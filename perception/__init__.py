@@ -1,1 +1,5 @@
 """Measurements to percept."""
+
+from perception.percept import Perception
+
+__all__ = ["Perception"]
