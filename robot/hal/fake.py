@@ -13,7 +13,7 @@ from config.rig import Rig
 from config.scenario import Scenario
 from robot.clock import LockStepClock
 from robot.errors import NotEngagedError, StaleStateError
-from robot.hal.protocols import Camera
+from robot.hal.protocols import Camera, Clock
 from robot.kinematics import Kinematics, ToolChain
 from robot.messages import (
     ArmCommand,
@@ -64,7 +64,7 @@ class FakeArm:
             qd_max_rad_s=_vec6([j.speed_rad_s for j in joints]),
             grip_stroke_m=arm.tool.stroke_m,
         )
-        self.clock = LockStepClock(tick_s=tick_s, advance=self._advance)
+        self.clock: Clock = LockStepClock(tick_s=tick_s, advance=self._advance)
         self._arm, self._tick_s = arm, tick_s
         self._chain = ToolChain(arm)
         lag = lag_s(lookahead_s=servo.lookahead_s, gain=servo.gain, dead_time_s=servo.dead_time_s)
@@ -153,7 +153,7 @@ class FakeArm:
 class FakeTruth:
     """Poses of everything the scenario names; a test may move them."""
 
-    def __init__(self, *, scenario: Scenario, clock: LockStepClock) -> None:
+    def __init__(self, *, scenario: Scenario, clock: Clock) -> None:
         self._clock = clock
         self._positions: dict[str, Vec3] = {}
         self._scenario = scenario

@@ -80,8 +80,27 @@ class Arm(Protocol):
 class Plant(Protocol):
     """One world, real or simulated; a rig names exactly one."""
 
-    identity: PlantIdentity
-    arm: Arm
-    cameras: Mapping[str, Camera]
-    truth: SceneTruth | None
-    resetter: Resetter
+    @property
+    def identity(self) -> PlantIdentity:
+        """Which world this is."""
+        ...
+
+    @property
+    def arm(self) -> Arm:
+        """The arm with its clock."""
+        ...
+
+    @property
+    def cameras(self) -> Mapping[str, Camera]:
+        """Cameras by name."""
+        ...
+
+    @property
+    def truth(self) -> SceneTruth | None:
+        """Ground truth, where there is any."""
+        ...
+
+    @property
+    def resetter(self) -> Resetter:
+        """What lays the table out."""
+        ...

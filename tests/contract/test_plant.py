@@ -7,22 +7,23 @@ import pytest
 
 from config.loader import resolve
 from robot.errors import RobotError, StaleStateError
-from robot.hal.fake import FakePlant
-from robot.hal.protocols import Plant
 from robot.kinematics import ToolChain
 from robot.messages import ArmCommand, GripCommand
 from robot.rigs import build_plant
 from robot.servo import lag_s
-from sim_twin.plant import TwinPlant
+from tests.contract.fits import PLANTS
 
-PLANTS: tuple[type[Plant], ...] = (FakePlant, TwinPlant)
 RIGS = ("fake", "twin")
 LIDS = 0b111000
 
 
+def resolve_rig(name):
+    return resolve(rig=name, scenario="paper", learning="default")
+
+
 @pytest.fixture(scope="module", params=RIGS)
 def resolved(request):
-    return resolve(rig=request.param, scenario="paper", learning="default")
+    return resolve_rig(request.param)
 
 
 @pytest.fixture
@@ -68,6 +69,11 @@ class Driver:
 @pytest.fixture
 def driver(plant, resolved):
     return Driver(plant, resolved)
+
+
+def test_every_plant_is_in_the_suite():
+    built = {type(build_plant(rig=r.rig, arm=r.arm, scenario=r.scenario)) for r in map(resolve_rig, RIGS)}
+    assert built == set(PLANTS)
 
 
 def test_spec_and_identity_are_readable_before_connecting(fresh, resolved):

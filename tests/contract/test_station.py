@@ -8,7 +8,6 @@ import pytest
 
 from config.loader import resolve
 from robot.errors import NotEngagedError, RobotConfigError, SafetyError, StaleStateError
-from robot.local_station import LocalStation
 from robot.messages import (
     ArmMode,
     Grip,
@@ -23,13 +22,9 @@ from robot.messages import (
     Twist,
 )
 from robot.rigs import build_operator, build_plant, build_station
-from robot.safety import Armable, Operator, TooManyLatchesError
-from robot.station import Station
+from robot.safety import TooManyLatchesError
 from sim_twin.operator import SimulatedOperator
 
-STATIONS: tuple[type[Station], ...] = (LocalStation,)
-ARMABLES: tuple[type[Armable], ...] = (LocalStation,)
-OPERATORS: tuple[type[Operator], ...] = (SimulatedOperator,)
 RIGS = ("fake", "twin")
 
 

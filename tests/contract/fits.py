@@ -1,0 +1,23 @@
+"""What implements which door: the type checker proves each line."""
+
+from perception.ground_truth import GroundTruthPerception
+from perception.percept import Perception
+from robot.clock import LockStepClock
+from robot.hal.fake import FakeArm, FakePlant
+from robot.hal.protocols import Arm, Clock, Plant
+from robot.local_station import LocalStation, Perceives
+from robot.safety import Armable, Operator
+from robot.station import Station
+from sim_twin.operator import SimulatedOperator
+from sim_twin.plant import TwinArm, TwinPlant
+
+__all__ = ["ARMABLES", "ARMS", "CLOCKS", "OPERATORS", "PERCEIVERS", "PERCEPTIONS", "PLANTS", "STATIONS"]
+
+PLANTS: tuple[type[Plant], ...] = (FakePlant, TwinPlant)
+ARMS: tuple[type[Arm], ...] = (FakeArm, TwinArm)
+CLOCKS: tuple[type[Clock], ...] = (LockStepClock,)
+STATIONS: tuple[type[Station], ...] = (LocalStation,)
+ARMABLES: tuple[type[Armable], ...] = (LocalStation,)
+OPERATORS: tuple[type[Operator], ...] = (SimulatedOperator,)
+PERCEPTIONS: tuple[type[Perception], ...] = (GroundTruthPerception,)
+PERCEIVERS: tuple[type[Perceives], ...] = (GroundTruthPerception,)
