@@ -39,6 +39,12 @@ class ContactGuard:
         self._held = None
         self._was_pushed_back = False
 
+    def is_free(self, force_n: Vec3) -> bool:
+        """Return whether nothing holds the tool and `reseat` need not be asked."""
+        fx, fy, fz = force_n
+        most = self._force_n
+        return fz <= most and fx * fx + fy * fy <= most * most and self._held is None and not self._was_pushed_back
+
     def ease(self, at_m: Vec3, wanted_m: Vec3) -> tuple[Vec3, bool]:
         """Let a step push on only a little while the tool is held up.
 

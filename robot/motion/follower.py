@@ -134,7 +134,7 @@ class Follower:
 
     def _slow(self, q: Vec6) -> Vec6:
         """Hold the tool back where a joint would be too fast, as near the base; it goes on at the speed it was let."""
-        excess = max(abs(a - b) / most for a, b, most in zip(q, self.q_rad, self._joint_step_rad, strict=True))
+        excess = max([abs(a - b) / most for a, b, most in zip(q, self.q_rad, self._joint_step_rad, strict=True)])
         if excess <= 1.0:
             return q
         share = 1.0 / excess

@@ -75,14 +75,15 @@ class Mover:
         would go on pressing.
         """
         follower = self._follower
-        commanded_m = follower.tcp(follower.q_rad)
-        moved = self._contact.reseat(state.tcp_force_n, state.tcp_position_m, commanded_m, follower.target_m)
-        if moved is not None:
-            self._limiters.append("contact")
-            yaw, back = follower.yaw_rad, self._back_to(state.q_rad)
-            follower.seed(back)
-            follower.aim(moved, yaw)
-            return back
+        if not self._contact.is_free(state.tcp_force_n):
+            commanded_m = follower.tcp(follower.q_rad)
+            moved = self._contact.reseat(state.tcp_force_n, state.tcp_position_m, commanded_m, follower.target_m)
+            if moved is not None:
+                self._limiters.append("contact")
+                yaw, back = follower.yaw_rad, self._back_to(state.q_rad)
+                follower.seed(back)
+                follower.aim(moved, yaw)
+                return back
         q = follower.step()
         if follower.trouble is not None:
             self._limiters.append(follower.trouble)

@@ -81,3 +81,20 @@ def test_a_reset_forgets_contact(guard):
     guard.reseat((0.0, 0.0, LIMIT + 1.0), TOOL, TOOL, BELOW)
     guard.reset()
     assert not guard.is_in_contact
+
+
+@pytest.mark.parametrize(
+    ("force", "free"),
+    [((0.0, 0.0, LIMIT), True), ((0.0, 0.0, LIMIT + 1e-9), False), ((LIMIT + 0.1, 0.0, 0.0), False), (FREE, True)],
+)
+def test_no_more_than_the_limit_is_free(guard, force, free):
+    assert guard.is_free(force) is free
+
+
+def test_held_or_pushed_back_is_not_free_even_without_force(guard):
+    guard.reseat((LIMIT + 1.0, 0.0, 0.0), TOOL, TOOL, TOOL)
+    assert not guard.is_free(FREE)
+    guard.reseat(FREE, TOOL, TOOL, TOOL)
+    assert guard.is_free(FREE)
+    guard.reseat((0.0, 0.0, LIMIT + 1.0), TOOL, TOOL, BELOW)
+    assert not guard.is_free(FREE)
