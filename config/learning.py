@@ -67,9 +67,13 @@ class SubgoalSelection(Section, frozen=True, kw_only=True):
     blocked_error: Share = 0.05
     """Least chance that a trial counts as blocked although nothing was missing."""
     curiosity: Share = 0.0
-    """Chance per trial that a doubtful precondition is tried out before the plan is followed."""
+    """Chance per epoch that a doubtful precondition is tried out before the plan is followed."""
     least_doubt: Share = 0.1
     """Least chance of being wrong that makes a precondition doubtful enough for that."""
+    probe_trials: Count = 6
+    """Most trials that trying it out and following the plan may take together."""
+    retest: Share = 0.0
+    """Chance per epoch that something believed is tried out again, to notice what is needed no longer."""
     use_blocked_only: bool = True
     """Only trials that reached the place but were blocked are evidence against."""
 
@@ -80,13 +84,20 @@ class Expert(Section, frozen=True, kw_only=True):
     hidden: Annotated[tuple[Count, ...], Meta(min_length=1, max_length=4)] = (64, 64)
     learning_rate: Positive = 1e-3
     batch: Count = 128
-    updates_per_trial: Annotated[int, Meta(ge=0, le=10_000)] = 20
+    updates_per_trial: Annotated[int, Meta(ge=0, le=10_000)] = 40
     trace: Count = 70
     """Longest part of a trial, counted back from its end, that is learnt from."""
     buffer_steps: Count = 20_000
     established_after: Count = 10
     """Successes after which the expert alone moves the arm."""
-    gate_power: NonNegative = 1.0
+    gate_power: NonNegative = 3.0
+    failure_tail: Count = 20
+    lr_half: Positive = 1e6
+    failure_weight: NonNegative = 4.0
+    expectile: Share = 0.8
+    boredom: NonNegative = 0.004
+    boredom_sigma: NonNegative = 0.05
+    ema: Share = 0.0
     horizon: Count = 70
     """Steps over which utility falls from 1 to 0 along a success trace."""
     failure_share: Share = 0.3
@@ -102,7 +113,7 @@ class Novelty(Section, frozen=True, kw_only=True):
 
     memory: Count = 200
     temperature: Positive = 0.05
-    wishes: Count = 128
+    wishes: Count = 512
     """Places compared when a new wish is made."""
     reach_m: Span = 0.5
     """How far off a wish may be."""
@@ -140,8 +151,10 @@ class Experiment(Section, frozen=True, kw_only=True):
     dense_for: Annotated[int, Meta(ge=0)] = 0
     """Evaluate every dense_every epochs for this many epochs after the start and after each change of rules."""
     checkpoint_every: Count = 50
+    retreat: bool = True
+    """Between the trials of an epoch the tool rises to travel height: given, and not counted as time steps."""
     blocked_after: Annotated[int, Meta(ge=1, le=1000)] = 3
-    """So many time steps running at the sub-goal's place to no effect make a trial a blocked one."""
+    """So many time steps at the sub-goal's place to no effect make a trial a blocked one."""
     end_blocked: bool = True
     """End a trial as soon as it counts as blocked: there is nothing more to learn from it."""
     void_limit: Count = 10

@@ -1,6 +1,6 @@
 """What one goal is believed to need: a posterior over conjunctions of literals on the other goals.
 
-A literal says of another goal that it must be on, or must be off. A goal-state is a bit mask here: bit i is goal i.
+A literal says of another goal that it must be on, or must be off. Sets of goals are bit masks here: bit i is goal i.
 """
 
 from collections.abc import Iterator, Sequence
@@ -10,7 +10,23 @@ from typing import Any, NamedTuple
 import msgspec
 import numpy as np
 
-__all__ = ["Belief", "Evidence", "Likelihood", "Needs", "conjunctions", "mask"]
+__all__ = ["START", "Belief", "Evidence", "Likelihood", "Needs", "Situation", "conjunctions", "mask"]
+
+
+class Situation(NamedTuple):
+    """Where an epoch stands. A thing taken and dropped is latched but holds no longer."""
+
+    holds: int
+    """Goals that hold: what must be on must be here."""
+    latched: int
+    """Goals achieved at some time in the epoch: what must be off must not be here."""
+
+    def after(self, goal: int, undone: int = 0) -> "Situation":
+        """Return the situation after a goal was achieved and others were lost by it."""
+        return Situation(self.holds & ~undone | 1 << goal, self.latched | 1 << goal)
+
+
+START = Situation(0, 0)
 
 
 class Needs(NamedTuple):
@@ -19,9 +35,9 @@ class Needs(NamedTuple):
     on: int
     off: int
 
-    def allow(self, state: int) -> bool:
-        """Whether the goal may come about in a goal-state."""
-        return state & self.on == self.on and not state & self.off
+    def allow(self, situation: Situation) -> bool:
+        """Whether the goal may come about in a situation."""
+        return not self.on & ~situation.holds and not self.off & situation.latched
 
 
 class Likelihood(msgspec.Struct, frozen=True, kw_only=True):
@@ -38,12 +54,12 @@ class Evidence(msgspec.Struct, frozen=True, kw_only=True):
 
     epoch: int
     is_achieved: bool
-    readings: tuple[int, ...]
-    """Goal-states that may have been in force; more than one where the order of events is not known."""
+    readings: tuple[Situation, ...]
+    """Situations that may have been in force; more than one where what happened can be read in several ways."""
 
 
 def mask(state: Sequence[bool]) -> int:
-    """Return a goal-state as a bit mask."""
+    """Return a tuple of flags as a bit mask."""
     return sum(1 << i for i, is_on in enumerate(state) if is_on)
 
 
@@ -75,28 +91,35 @@ class Belief:
         self.probabilities = self._prior.copy()
         """Posterior, in the order of `conjunctions`.  (h,)"""
 
-    def allows(self, state: int) -> np.ndarray:
-        """Return which conjunctions allow the goal in a goal-state.  () -> (h,)"""
-        return ((self._on & state) == self._on) & ((self._off & state) == 0)
+    def allows(self, situation: Situation) -> np.ndarray:
+        """Return which conjunctions allow the goal in a situation.  () -> (h,)"""
+        return ((self._on & ~situation.holds) | (self._off & situation.latched)) == 0
 
     def mix_with_prior(self, hazard: float) -> None:
         """Take the needs to have been drawn anew with this chance."""
         self.probabilities = (1.0 - hazard) * self.probabilities + hazard * self._prior
 
-    def update(self, evidence: Evidence, likelihood: Likelihood) -> None:
-        """Apply Bayes' rule to one attempt.
+    def update(self, evidence: Evidence, likelihood: Likelihood, *, weight: float = 1.0) -> float:
+        """Apply Bayes' rule to one attempt and return the chance that had been given to its result.
 
-        Where more than one reading of the goal-state is possible, a conjunction gets the benefit of the doubt: success
-        speaks for it if any reading allows the goal, failure against it only if all do.
+        Where the situation can be read in more than one way, success is likely if any reading allows the goal (the
+        trial goes on until it does); failure is averaged over the readings.
+
+        Args:
+            evidence: the attempt.
+            likelihood: how telling it is.
+            weight: power that the likelihood is raised to; below 1 for evidence that is not independent.
         """
-        allowed = np.stack([self.allows(state) for state in evidence.readings])  # (readings, h)
+        allowed = np.stack([self.allows(situation) for situation in evidence.readings])  # (readings, h)
         p_hit, fp = likelihood.p_hit, likelihood.false_positive
         if evidence.is_achieved:
             factors = np.where(allowed.any(axis=0), p_hit, fp)
         else:
-            factors = np.where(allowed.all(axis=0), 1.0 - p_hit, 1.0 - fp)
-        posterior = self.probabilities * factors
+            factors = np.where(allowed, 1.0 - p_hit, 1.0 - fp).mean(axis=0)
+        expected = float(self.probabilities @ factors)
+        posterior = self.probabilities * factors**weight
         self.probabilities = posterior / posterior.sum()
+        return expected
 
     def sample(self, rng: np.random.Generator) -> Needs:
         """Draw a conjunction from the posterior."""
@@ -108,9 +131,9 @@ class Belief:
         best = int(np.argmax(self.probabilities))
         return self._needs(best), float(self.probabilities[best])
 
-    def predict_allowed(self, state: int) -> float:
-        """Return the probability that the goal is allowed in a goal-state."""
-        return float(self.probabilities[self.allows(state)].sum())
+    def predict_allowed(self, situation: Situation) -> float:
+        """Return the probability that the goal is allowed in a situation."""
+        return float(self.probabilities @ self.allows(situation))
 
     def marginals(self) -> tuple[tuple[float, float], ...]:
         """Return for each goal the probability that it must be on, and that it must be off."""

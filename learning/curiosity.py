@@ -1,0 +1,164 @@
+"""What to try in order to know more: probes of doubtful, suspect and long untried preconditions.
+
+Thompson sampling looks only at what serves the goal in hand. It never learns which of two pressed buttons it was that
+blocked a goal (it presses neither), nor that something is needed no longer (it provides it). A probe goes where that
+shows, if the epoch's goal can still be achieved after it.
+"""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from config.learning import SubgoalSelection
+from learning.graph import Finding, Graph
+from learning.preconditions import START, Needs, Situation
+
+__all__ = ["Curiosity", "Probe"]
+
+N_WALKS = 6
+FADE = 0.998
+"""How much of the memory of past probes is left after an epoch."""
+SURPRISE = 0.1
+"""A result that had been given less than this chance is suspect."""
+
+
+_Spot = tuple[int, Situation]
+"""A goal, and a situation in which it is tried."""
+
+
+class Probe(NamedTuple):
+    """Goals to achieve from the start of an epoch, the last of them the doubtful one."""
+
+    steps: tuple[int, ...]
+    situation: Situation
+    """In which the doubtful goal is tried, as far as it is known what gets lost on the way."""
+
+    def next_step(self, latched: int) -> int | None:
+        """Return what to try in a goal-state, or None where that is not on the way."""
+        on_the_way = 0
+        for step in self.steps:
+            if on_the_way == latched:
+                return step
+            on_the_way |= 1 << step
+        return None
+
+
+class Curiosity:
+    """Starts a probe at some epochs' beginning and sees it through."""
+
+    def __init__(self, *, config: SubgoalSelection, rng: np.random.Generator) -> None:
+        self._config = config
+        self._rng = rng
+        self._probe: Probe | None = None
+        self._tries: dict[_Spot, float] = {}
+        """How often probed; what stays doubtful though probed gets boring."""
+        self._suspects: set[_Spot] = set()
+        """Where the last result was a surprise."""
+
+    def step(self, goal: int, here: Situation, graph: Graph) -> int | None:
+        """Return what to try for curiosity's sake while an epoch's goal is pursued, or None."""
+        if here == START:
+            self._probe = self._begin(goal, graph)
+        step = self._probe.next_step(here.latched) if self._probe else None
+        if self._probe and (step is None or step == self._probe.steps[-1]):
+            self._probe = None
+        return step
+
+    def take_in(self, finding: Finding) -> None:
+        """Remember surprises, and look anew at a goal whose needs were revised."""
+        at = (finding.goal, finding.situation)
+        if finding.is_revised:
+            self._tries = {key: n for key, n in self._tries.items() if key[0] != finding.goal}
+        if finding.expected < SURPRISE:
+            self._suspects.add(at)
+        else:
+            self._suspects.discard(at)
+
+    # ------------------------------------------------------------------------------------------------------ probes
+
+    def _begin(self, goal: int, graph: Graph) -> Probe | None:
+        """Return a probe after which the epoch's goal can still be achieved within the trials, or None."""
+        self._tries = {key: FADE * n for key, n in self._tries.items()}
+        chance = self._rng.random()
+        if chance < self._config.retest:
+            probe = self._retest(graph)
+        elif chance < self._config.retest + self._config.curiosity:
+            probe = self._most_doubtful(goal, graph)
+        else:
+            probe = None
+        if probe is None or not self._fits(probe, goal, graph):
+            return None
+        at = (probe.steps[-1], probe.situation)
+        self._tries[at] = self._tries.get(at, 0.0) + graph.skill(probe.steps[-1])
+        return probe
+
+    def _most_doubtful(self, goal: int, graph: Graph) -> Probe | None:
+        """Return the probe of most doubt per trial that is met on random walks, or None where there is little doubt."""
+        best, best_value = None, 0.0
+        for _ in range(N_WALKS):
+            here, steps = START, ()
+            while len(steps) < self._config.probe_trials:
+                doubts = self._doubts(here, graph)
+                doubtful = int(np.argmax(doubts))
+                value = float(doubts[doubtful]) / (len(steps) + 1)
+                probe = Probe((*steps, doubtful), here)
+                if doubts[doubtful] >= self._config.least_doubt and value > best_value and self._fits(probe, goal, graph):
+                    best, best_value = probe, value
+                ways = [i for i in range(graph.n_goals) if not here.latched >> i & 1 and graph.most_probable(i).allow(here)]
+                if not ways:
+                    break
+                step = ways[int(self._rng.integers(len(ways)))]
+                here, steps = here.after(step, graph.undone(step)), (*steps, step)
+        return best
+
+    def _retest(self, graph: Graph) -> Probe | None:
+        """Return a probe of one believed literal, drawn at random: the goal is tried with only that one violated."""
+        literals = [
+            (g, j)
+            for g in range(graph.n_goals)
+            for j in range(graph.n_goals)
+            if (graph.most_probable(g).on | graph.most_probable(g).off) >> j & 1
+        ]
+        if not literals:
+            return None
+        goal, violated = literals[int(self._rng.integers(len(literals)))]
+        needs, bit = graph.most_probable(goal), 1 << violated
+        others = Needs(needs.on ^ bit, needs.off ^ bit)
+        steps = graph.plan(goal, START, lambda i: others if i == goal else graph.most_probable(i))
+        return Probe(steps, graph.follow(steps[:-1])) if steps else None
+
+    def _doubts(self, here: Situation, graph: Graph) -> np.ndarray:
+        """Return how doubtful each goal not yet achieved is, less the more often it was probed.  () -> (n,)"""
+        p = graph.predict_allowed(here)
+        doubts = np.minimum(p, 1.0 - p)
+        for i in range(graph.n_goals):
+            if here.latched >> i & 1:
+                doubts[i] = -1.0
+            elif (i, here) in self._suspects:
+                doubts[i] = 0.5
+            doubts[i] /= 1.0 + self._tries.get((i, here), 0.0)
+        return doubts
+
+    def _fits(self, probe: Probe, goal: int, graph: Graph) -> bool:
+        """Whether the epoch's goal can be achieved after a probe, however that ends, within the trials."""
+        tried = probe.steps[-1]
+        for end in (probe.situation, probe.situation.after(tried, graph.undone(tried))):
+            rest = () if end.latched >> goal & 1 else graph.plan(goal, end)
+            if rest is None or len(probe.steps) + len(rest) > self._config.probe_trials:
+                return False
+        return True
+
+    def state_dict(self) -> dict[str, Any]:
+        """Return all memory; the generator belongs to the selector."""
+        return {
+            "probe": None if self._probe is None else [list(self._probe.steps), list(self._probe.situation)],
+            "tries": [[goal, list(situation), n] for (goal, situation), n in self._tries.items()],
+            "suspects": [[goal, list(situation)] for goal, situation in sorted(self._suspects)],
+        }
+
+    def load_state_dict(self, state: dict[str, Any]) -> None:
+        """Restore bit for bit."""
+        probe = state["probe"]
+        self._probe = None if probe is None else Probe(tuple(probe[0]), Situation(*probe[1]))
+        self._tries = {(goal, Situation(*situation)): n for goal, situation, n in state["tries"]}
+        self._suspects = {(goal, Situation(*situation)) for goal, situation in state["suspects"]}
