@@ -75,16 +75,16 @@ class MotionLimits(Section, frozen=True, kw_only=True):
     max_step_m: Annotated[float, Meta(gt=0.0, le=0.1)] = 0.022
     leash_m: Span = 0.09
     """How far the target may run ahead of the measured tool."""
-    guard_height_m: Span = 0.16
+    guard_height_m: Span = 0.18
     """Below this height over the table the tool moves at guarded speed."""
-    guarded_speed_m_s: Annotated[float, Meta(gt=0.0, le=0.5)] = 0.2
+    guarded_speed_m_s: Annotated[float, Meta(gt=0.0, le=0.5)] = 0.25
     speed_m_s: Annotated[float, Meta(gt=0.0, le=2.0)] = 0.5
     """Greatest speed of the tool along any axis."""
     acceleration_m_s2: Annotated[float, Meta(gt=0.0, le=20.0)] = 3.0
     jerk_m_s3: Annotated[float, Meta(gt=0.0, le=2000.0)] = 100.0
     contact_force_n: Positive = 15.0
     """Force on the tool at which a descent is stopped and reported as contact."""
-    heights_m: tuple[Span, Span] = (0.025, 0.21)
+    heights_m: tuple[Span, Span] = (0.025, 0.225)
     """Lowest and travel height of the tool centre point over the table."""
     workspace_m: tuple[Point, Point]
     """Corners of the box that the tool centre point may be in, base frame."""

@@ -55,7 +55,7 @@ class Lid(Section, frozen=True, kw_only=True):
 
     output: Annotated[int, Meta(ge=0, le=15)]
     open_angle_rad: Annotated[float, Meta(gt=0.5, le=2.6)] = 1.85
-    speed_rad_s: Annotated[float, Meta(gt=0.0, le=2.0)] = 1.8
+    speed_rad_s: Annotated[float, Meta(gt=0.0, le=2.0)] = 1.95
     force_n: Annotated[float, Meta(gt=0.0, le=5.0)] = 4.0
     """Greatest force at a leaf's free edge."""
 
@@ -123,7 +123,7 @@ class RuleSpan(Section, frozen=True, kw_only=True):
 class Start(Section, frozen=True, kw_only=True):
     """Where the tool centre point starts an epoch: a box it is drawn from, base frame."""
 
-    position_m: tuple[Length, Length, Length] = (0.42, 0.0, 0.21)
+    position_m: tuple[Length, Length, Length] = (0.42, 0.0, 0.225)
     spread_m: tuple[Span, Span, Span] = (0.06, 0.1, 0.005)
 
 
@@ -143,7 +143,7 @@ class Reflexes(Section, frozen=True, kw_only=True):
 class Evaluation(Section, frozen=True, kw_only=True):
     """How far the tool may be off for a place to count as reached."""
 
-    reach_radius_m: Span = 0.015
+    reach_radius_m: Span = 0.03
     reach_height_m: Span = 0.02
 
 

@@ -12,10 +12,13 @@ import msgspec
 from config.learning import Experiment
 from learning.interfaces import Attempt, Experts, GoalState, SubgoalSelector, TrialOutcome
 from learning.stopwatch import Stopwatch
-from robot.messages import Percept
+from robot.messages import Heading, Percept
 from robot.station import Station
 
 __all__ = ["Agent", "EpochRecord", "GoalJudge", "GoalSelector", "TrialRecord"]
+
+RETREAT_STEPS = 20
+RISEN_WITHIN_M = 0.012
 
 
 class GoalSelector(Protocol):
@@ -179,6 +182,8 @@ class Agent:
     def _run_epoch(self, station: Station, scene: _Scene, *, epoch: int, goal: int, explore: bool) -> EpochRecord:
         records: list[TrialRecord] = []
         while not scene.latched[goal] and len(records) < self._protocol.trials:
+            if records and not self._retreat(station, scene):
+                return EpochRecord(epoch=epoch, goal=goal, is_achieved=False, is_void=True, trials=tuple(records))
             record = self._run_trial(station, scene, epoch=epoch, goal=goal, trial=len(records) + 1, explore=explore)
             records.append(record)
             if record.attempt.outcome is TrialOutcome.VOID:
@@ -227,6 +232,22 @@ class Agent:
         )
         return TrialRecord(trial=trial, attempt=attempt, temperature=temperature)
 
+    def _retreat(self, station: Station, scene: _Scene) -> bool:
+        """Rise to travel height, so that a trial begins where nothing is in the way; return False where it was void."""
+        if not self._protocol.retreat:
+            return True
+        height = station.spec.heights_m[1]
+        high_enough = station.spec.table_height_m + height - RISEN_WITHIN_M
+        for _ in range(RETREAT_STEPS):
+            if scene.percept.tcp_position_m[2] >= high_enough:
+                break
+            result = station.step(Heading(heading_rad=0.0, distance_m=0.0, height_m=height))
+            if result.is_void:
+                return False
+            self._take_in(scene, result.percept)
+        self._stopwatch.lap("stack")
+        return True
+
     def _pursue(self, station: Station, scene: _Scene, subgoal: int) -> tuple[TrialOutcome, int]:
         """Let the sub-goal's expert move the arm until the trial ends."""
         lap, experts, protocol = self._stopwatch.lap, self.experts, self._protocol
@@ -244,7 +265,7 @@ class Agent:
             lap("experts")
             if scene.holding[subgoal]:
                 return TrialOutcome.ACHIEVED, step
-            n_at_place = n_at_place + 1 if self.judge.is_at_place(subgoal, scene.percept) else 0
+            n_at_place += self.judge.is_at_place(subgoal, scene.percept)
             lap("judge")
             is_blocked = is_blocked or n_at_place >= protocol.blocked_after
             if is_blocked and protocol.end_blocked:

@@ -23,6 +23,8 @@ FINGER_STIFFNESS = 6_000.0  # N/m
 _BOX = mujoco.mjtGeom.mjGEOM_BOX
 _CYLINDER = mujoco.mjtGeom.mjGEOM_CYLINDER
 _FIXTURE = {"contype": FIXTURE_CONTACT[0], "conaffinity": FIXTURE_CONTACT[1]}
+# Boxes and lids wear padding that gives way under a finger: a hand that strikes a lid's edge is not broken.
+_PADDED = {**_FIXTURE, "friction": [0.6, 0.01, 0.0001], "solref": [0.03, 1.0], "priority": 1}
 _LOOK = {"contype": 0, "conaffinity": 0, "mass": 0, "group": 1}
 
 
@@ -140,7 +142,7 @@ def _add_box(spec: mujoco.MjSpec, box: Box, table_m: float) -> None:
         size = [w / 2, ly / 2 + w, h / 2] if axis == 0 else [lx / 2, w / 2, h / 2]
         pos = [0.0, 0.0, h / 2]
         pos[axis] = sign * ((lx if axis == 0 else ly) / 2 + w / 2)
-        body.add_geom(type=_BOX, size=size, pos=pos, rgba=[*box.colour, 1], friction=[0.6, 0.01, 0.0001], **_FIXTURE)
+        body.add_geom(type=_BOX, size=size, pos=pos, rgba=[*box.colour, 1], **_PADDED)
     if box.lid is None:
         return
     leaf = lx / 2 + w / 2
@@ -154,7 +156,7 @@ def _add_box(spec: mujoco.MjSpec, box: Box, table_m: float) -> None:
         hinge.add_geom(
             name=name, type=_BOX, size=[(leaf - 0.001) / 2, ly / 2 + w, LEAF_THICKNESS_M / 2],
             pos=[-sign * (leaf - 0.001) / 2, 0, 0], mass=0.06, rgba=[*_dim(box.colour, 0.86), 1],
-            friction=[0.6, 0.01, 0.0001], solref=[0.015, 1.0], **_FIXTURE,
+            **_PADDED,
         )  # fmt: skip
         torque = box.lid.force_n * leaf
         drive = spec.add_actuator(
