@@ -15,6 +15,8 @@ from learning.preconditions import START, Belief, Evidence, Likelihood, Needs, S
 __all__ = ["Finding", "Graph"]
 
 LEAST_SKILL = 0.05
+BEGINNERS_LUCK = 0.15
+"""Chance that an expert without one success achieves its goal in a trial where it is allowed."""
 LOSS = 0.02
 """Chance that achieving a goal loses another, before it was ever seen."""
 N_EVIDENCE = 200
@@ -50,6 +52,8 @@ class Graph:
         self._lost = np.zeros((n_goals, n_goals))
         """[j, k]: how often goal k held when goal j was achieved, and then held no longer."""
         self._changed_epoch: list[int | None] = [None] * n_goals
+        self._is_known = [False] * n_goals
+        """Goals that came about at least once."""
         self._log = tuple(deque[Evidence](maxlen=N_EVIDENCE) for _ in range(n_goals))
 
     # ------------------------------------------------------------------------------------------------------ learn
@@ -66,6 +70,8 @@ class Graph:
             findings.append(self._update(tried, attempt, is_achieved=True))
         elif outcome is TrialOutcome.BLOCKED or not self._config.use_blocked_only:
             findings.append(self._update(tried, attempt, is_achieved=False))
+        elif not self._is_known[tried]:
+            self._doubt(tried, attempt)
         for i, (was_on, is_on) in enumerate(zip(attempt.state, attempt.state_after, strict=True)):
             if is_on and not was_on and i != tried:
                 findings.append(self._update(i, attempt, is_achieved=True))
@@ -73,6 +79,7 @@ class Graph:
 
     def _update(self, goal: int, attempt: Attempt, *, is_achieved: bool) -> Finding:
         belief, before = self.beliefs[goal], self.most_probable(goal)
+        self._is_known[goal] |= is_achieved
         evidence = Evidence(
             epoch=attempt.epoch, is_achieved=is_achieved, readings=_readings(goal, attempt, is_achieved=is_achieved)
         )
@@ -85,6 +92,18 @@ class Graph:
         if is_revised:
             self._changed_epoch[goal] = attempt.epoch
         return Finding(goal=goal, situation=_situation(attempt), expected=expected, is_revised=is_revised)
+
+    def _doubt(self, goal: int, attempt: Attempt) -> None:
+        """Trust a goal-state a little less where a goal that never came about did not come about once more.
+
+        An expert without one success may be unskilled, or the goal not allowed here: each trial weighs a little, so
+        that a search for the first success does not stay in one goal-state for ever.
+        """
+        evidence = Evidence(
+            epoch=attempt.epoch, is_achieved=False, readings=_readings(goal, attempt, is_achieved=False)
+        )
+        luck = Likelihood(p_hit=BEGINNERS_LUCK, false_positive=self._config.false_positive)
+        self.beliefs[goal].update(evidence, luck)
 
     def _likelihood(self, skill: float) -> Likelihood:
         """Return how telling an attempt is. An expert that was at the place fails less often than its skill says."""
@@ -106,7 +125,7 @@ class Graph:
 
     def most_probable(self, goal: int) -> Needs:
         """Return a goal's most probable needs."""
-        return self.beliefs[goal].most_probable()[0]
+        return self.beliefs[goal].most_probable
 
     def draw(self, rng: np.random.Generator) -> Callable[[int], Needs]:
         """Return a function that draws each goal's needs from the posterior once, when first asked."""
@@ -184,7 +203,8 @@ class Graph:
             "carried": self._carried.copy(),
             "lost": self._lost.copy(),
             "changed_epoch": list(self._changed_epoch),
-            "log": [[msgspec.to_builtins(evidence) for evidence in kept] for kept in self._log],
+            "is_known": list(self._is_known),
+            "log": [[msgspec.json.decode(msgspec.json.encode(evidence)) for evidence in kept] for kept in self._log],
         }
 
     def load_state_dict(self, state: dict[str, Any]) -> None:
@@ -195,6 +215,7 @@ class Graph:
         self._carried = np.array(state["carried"], dtype=float)
         self._lost = np.array(state["lost"], dtype=float)
         self._changed_epoch = list(state["changed_epoch"])
+        self._is_known = list(state["is_known"])
         for kept, loaded in zip(self._log, state["log"], strict=True):
             kept.clear()
             kept.extend(msgspec.convert(loaded, list[Evidence]))

@@ -67,6 +67,10 @@ class TwinWorld:
     def advance(self) -> None:
         """One tick: drives, then physics."""
         step = self.grip_speed_m_s * self.tick_s
+        if self.opening_goal_m > self.opening_asked_m:
+            # A hand that squeezed has its set-point far inside the object: it lets go from where the fingers are.
+            left, right = self.finger_addresses
+            self.opening_asked_m = max(self.opening_asked_m, float(self.data.qpos[left] + self.data.qpos[right]))
         self.opening_asked_m += min(max(self.opening_goal_m - self.opening_asked_m, -step), step)
         self.grip_set_point[0] = self.opening_asked_m
         if self.stop_speed_rad_s is not None:

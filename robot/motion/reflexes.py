@@ -1,5 +1,7 @@
 """Reflexes of the hand: given, not learnt. State of one hand between resets."""
 
+import math
+
 import msgspec
 
 from config.arm import ArmConfig
@@ -12,6 +14,8 @@ __all__ = ["HandReflexes"]
 ABOVE_M = 0.008
 """The hand closes when the tool centre point is no higher than this above the object's centre."""
 ACROSS_MARGIN_M = 0.001
+IN_HAND_M = 0.035
+"""What a full hand holds has its centre this near the tool centre point."""
 CLEAR_M = 0.03
 """A hand that let go may close again once the object is this far to the side, or half its height below."""
 SET_DOWN_M = 0.002
@@ -102,8 +106,9 @@ class HandReflexes:
         """Follow what is held and what has become of it."""
         has_object = percept.grip.has_object
         self.lost_object = self._had_object and not has_object and self._command is self._shut
-        if has_object and not self._had_object:
-            self._held, self._was_lifted = self._between_jaws(percept), False
+        if has_object and self._held is None:
+            # Closing shifts what is gripped, out of the window in which the hand began to close by a little.
+            self._held, self._was_lifted = self._in_hand(percept), False
             self._grasped_at_m = self._height_of(percept, self._held)
         elif not has_object:
             self._held = None
@@ -173,6 +178,13 @@ class HandReflexes:
             ):
                 return loose
         return None
+
+    def _in_hand(self, percept: Percept) -> _Loose | None:
+        """The loose thing nearest the tool centre point, if one is near enough to be what a full hand holds."""
+        tool = percept.tcp_position_m
+        near = [(math.dist(self._position_of(percept, loose), tool), i) for i, loose in enumerate(self._loose)]
+        distance, i = min(near, default=(math.inf, -1))
+        return self._loose[i] if distance < IN_HAND_M else None
 
     def _is_near(self, percept: Percept, loose: _Loose) -> bool:
         across, along, below = tool_offset(self._position_of(percept, loose), percept.tcp_position_m, self._yaw_rad)
