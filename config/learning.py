@@ -84,20 +84,23 @@ class Expert(Section, frozen=True, kw_only=True):
     hidden: Annotated[tuple[Count, ...], Meta(min_length=1, max_length=4)] = (64, 64)
     learning_rate: Positive = 1e-3
     batch: Count = 128
-    updates_per_trial: Annotated[int, Meta(ge=0, le=10_000)] = 40
+    updates_per_trial: Annotated[int, Meta(ge=0, le=10_000)] = 20
     trace: Count = 70
     """Longest part of a trial, counted back from its end, that is learnt from."""
     buffer_steps: Count = 20_000
     established_after: Count = 10
     """Successes after which the expert alone moves the arm."""
-    gate_power: NonNegative = 3.0
+    relevance_power: NonNegative = 3.0
+    """How sharply inputs are weighted by how steady their distance was at success; 0 weighs all alike."""
     failure_tail: Count = 20
-    lr_half: Positive = 1e6
+    """Time steps at the end of a failed trial that are learnt as worthless."""
     failure_weight: NonNegative = 4.0
+    """How much more often a failed step is drawn than a successful one, up to failure_share of a batch."""
     expectile: Share = 0.8
+    """Above 0.5, better traces through a place count for more than worse ones."""
     boredom: NonNegative = 0.004
-    boredom_sigma: NonNegative = 0.05
-    ema: Share = 0.0
+    """Utility taken off places like those of the last steps, each."""
+    boredom_sigma: Positive = 0.05
     horizon: Count = 70
     """Steps over which utility falls from 1 to 0 along a success trace."""
     failure_share: Share = 0.3

@@ -7,7 +7,7 @@ import torch
 from config.resolved import Resolved
 from learning.agent import Agent
 from learning.evaluation_pool import MakeLearner
-from learning.expert_set import ExpertSet
+from learning.experts import ExpertSet
 from learning.goal_selector import GoalSelector
 from learning.goals import GoalJudge
 from learning.seeds import named_generator

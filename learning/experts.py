@@ -1,0 +1,188 @@
+"""All experts of a learner behind one door: who moves the arm in a trial, and who learns from it.
+
+At each time step candidate moves are rated by the utility that the sub-goal's model expects where the forward model
+says they lead. Before a model has seen enough success, curiosity moves the arm instead, and a goal reached by accident
+gives its own model a trace. Everything here sees P(t), the shaped target and intents; goals are indices.
+"""
+
+from typing import Any
+
+import numpy as np
+
+from config.learning import LearningConfig
+from learning.actions import Candidates, heading_of
+from learning.forward_model import make_forward_model
+from learning.interfaces import GoalState, TrialOutcome
+from learning.networks import normalised
+from learning.novelty import Curiosity, NoveltyMemory
+from learning.utility_model import UtilityModel
+from robot.messages import Heading, Percept, StationSpec, StepResult
+
+__all__ = ["ExpertSet"]
+
+Array = np.ndarray
+
+FIRST_TRUST = 0.3
+"""Share of trials in which a model moves the arm after its first success; it rises to 1 when it is established."""
+STUCK_STEPS = 9
+STUCK_M = 0.004
+"""A model that let no distance change by more than this in so many steps is stuck."""
+DETOUR_STEPS = 15
+REST_STEPS = 10
+"""Steps of a trial, and after a detour, before a model can count as stuck."""
+SEEN = 24
+"""Steps that boredom remembers."""
+REMEMBER_EVERY = 4
+
+
+class ExpertSet:
+    """One utility model a goal, one forward model, one curiosity."""
+
+    def __init__(self, config: LearningConfig, spec: StationSpec, *, n_goals: int, rng: np.random.Generator) -> None:
+        self._config = config.expert
+        self._scales_m = config.expert.scales_m
+        streams = rng.spawn(n_goals + 2)
+        self._models = [
+            UtilityModel(config.expert, n_distances=spec.n_distances, n_states=spec.n_buttons, rng=stream)
+            for stream in streams[2:]
+        ]
+        self._rng = streams[0]
+        self._forward = make_forward_model(config.forward_model, spec, streams[1])
+        n_inputs = len(self._models[0].weights)
+        self._memory = NoveltyMemory(config.novelty.memory, n_inputs)
+        self._curiosity = Curiosity(
+            config.novelty, spec, forward=self._forward, memory=self._memory, scales_m=self._scales_m, rng=self._rng
+        )
+        self._candidates = Candidates(spec, config.actions)
+        self._begin(0, explore=False, is_by_model=True)
+
+    def _begin(self, subgoal: int, *, explore: bool, is_by_model: bool) -> None:
+        self._subgoal, self._is_exploring, self._is_by_model = subgoal, explore, is_by_model
+        self._intent = Heading(heading_rad=0.0, distance_m=0.0, height_m=0.0)
+        self._trace: list[Array] = []
+        """Normalised P's that the moves of this trial were to lead to."""
+        self._distances_m: list[Array] = []
+        self._seen: list[Array] = []
+        self._came_about: list[int] = []
+        self._n_steps = 0
+        self._detour = 0
+        self._rested_at = REST_STEPS
+
+    def begin_trial(self, subgoal: int, percept: Percept, *, explore: bool) -> None:
+        """Start a trial; without explore nothing is drawn and nothing learnt changes."""
+        self._forward.begin(percept)
+        self._curiosity.begin()
+        is_by_model = True
+        if explore:
+            n = self._models[subgoal].n_successes
+            trust = min(1.0, FIRST_TRUST + (1.0 - FIRST_TRUST) * n / self._config.established_after) if n else 0.0
+            is_by_model = bool(self._rng.random() < trust)
+        self._begin(subgoal, explore=explore, is_by_model=is_by_model)
+
+    def act(self, percept: Percept) -> Heading:
+        """Return the next intent."""
+        states = np.array(percept.button_states, dtype=np.float32)
+        if self._is_exploring and self._is_by_model:
+            self._note_stuck(percept)
+        if self._is_by_model and not self._detour:
+            asked, x = self._best(states)
+        else:
+            asked = self._curiosity.act(percept)
+            x = normalised(self._forward.predict(asked[None]), states, self._scales_m)[0]
+            self._detour = max(0, self._detour - 1)
+        if self._is_exploring:
+            self._trace.append(x)
+        self._intent = heading_of(asked)
+        return self._intent
+
+    def _best(self, states: Array) -> tuple[Array, Array]:
+        """Return the candidate of greatest expected utility, and the P it leads to."""
+        model = self._models[self._subgoal]
+        asked = self._candidates.asked(self._rng.random() if self._is_exploring else 0.0)
+        x = normalised(self._forward.predict(asked), states, self._scales_m)
+        utility = model.rate(x) - self._boredom(x * model.weights)
+        best = int(np.argmax(utility))
+        self._seen = [*self._seen[-(SEEN - 1) :], x[best] * model.weights]
+        return asked[best], x[best]
+
+    def _boredom(self, x: Array) -> Array:
+        """Return what is taken off places like those just asked for: no ripple of a model holds the arm for good.
+
+        boredom * sum over the last steps of exp(-|x - seen|^2 / (2 sigma^2)).  (k, n_inputs) -> (k,)
+        """
+        if not self._seen or not self._config.boredom:
+            return np.zeros(len(x), dtype=np.float32)
+        seen = np.array(self._seen)
+        apart = (x * x).sum(axis=1)[:, None] - 2.0 * x @ seen.T + (seen * seen).sum(axis=1)
+        return self._config.boredom * np.exp(apart * (-0.5 / self._config.boredom_sigma**2)).sum(axis=1)
+
+    def _note_stuck(self, percept: Percept) -> None:
+        """A model that holds the arm where nothing happens is shown its error, and curiosity takes over for a while."""
+        self._distances_m = [*self._distances_m[-(STUCK_STEPS - 1) :], np.array(percept.distances_m)]
+        if self._detour or self._n_steps <= self._rested_at or len(self._distances_m) < STUCK_STEPS:
+            return
+        if np.abs(self._distances_m[-1] - self._distances_m[0]).max() >= STUCK_M:
+            return
+        self._models[self._subgoal].fail(np.array(self._trace[-STUCK_STEPS:]))
+        self._trace = self._trace[-1:]
+        self._detour = DETOUR_STEPS
+        self._rested_at = self._n_steps + DETOUR_STEPS + REST_STEPS
+        self._curiosity.begin()
+
+    def observe(self, result: StepResult, achieved: GoalState) -> None:
+        """Take in what the step came to; achieved tells every goal that came about in this very step."""
+        self._forward.observe(self._intent, result, is_learning=self._is_exploring)
+        self._n_steps += 1
+        if not self._is_exploring:
+            return
+        if self._n_steps % REMEMBER_EVERY == 0:
+            self._memory.add(self._trace[-1])
+        for goal, is_achieved in enumerate(achieved):
+            if is_achieved:
+                self._came_about.append(goal)
+                end_m = np.array(result.percept.distances_m)
+                self._models[goal].succeed(np.array(self._trace), end_m, is_own=goal == self._subgoal)
+
+    def end_trial(self, outcome: TrialOutcome) -> None:
+        """Close the trial and train; a blocked trial says nothing against the skill, a void one nothing at all."""
+        if not self._is_exploring or outcome is TrialOutcome.VOID:
+            return
+        model = self._models[self._subgoal]
+        is_missed = outcome is TrialOutcome.NOT_REACHED
+        if is_missed and self._trace:
+            model.fail(np.array(self._trace))
+        if outcome is not TrialOutcome.BLOCKED:
+            if self._is_by_model:
+                model.count(is_success=not is_missed)
+            model.train(is_surprised=is_missed)
+        for goal in self._came_about:
+            if goal != self._subgoal:
+                self._models[goal].train(is_surprised=True)
+        self._forward.train()
+
+    def utility(self, subgoal: int, percept: Percept) -> float:
+        """Return the expected probability of achieving the sub-goal from here, in [0, 1]."""
+        distances = np.array([percept.distances_m])
+        x = normalised(distances, np.array(percept.button_states, dtype=np.float32), self._scales_m)
+        return self._models[subgoal].chance(x[0])
+
+    def skill(self, subgoal: int) -> float:
+        """Return the measured chance of success where nothing blocks, in [0, 1]."""
+        return self._models[subgoal].skill
+
+    def state_dict(self) -> dict[str, Any]:
+        """Return everything learnt and the generators' states. Between epochs nothing else is held."""
+        return {
+            "models": [model.state_dict() for model in self._models],
+            "forward": self._forward.state_dict(),
+            "memory": self._memory.state_dict(),
+            "rng": self._rng.bit_generator.state,
+        }
+
+    def load_state_dict(self, state: dict[str, Any]) -> None:
+        """Restore bit for bit."""
+        for model, loaded in zip(self._models, state["models"], strict=True):
+            model.load_state_dict(loaded)
+        self._forward.load_state_dict(state["forward"])
+        self._memory.load_state_dict(state["memory"])
+        self._rng.bit_generator.state = state["rng"]
