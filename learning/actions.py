@@ -23,7 +23,7 @@ class Candidates:
         rows = [np.zeros((1, 3))]
         rows.append(np.column_stack([lengths * np.cos(bearings), lengths * np.sin(bearings), np.zeros_like(lengths)]))
         level = np.concatenate(rows)
-        self._asked = np.concatenate([level + (0.0, 0.0, height) for height in spec.heights_m[::-1]])
+        self._asked = np.concatenate([level + np.array([0.0, 0.0, height]) for height in spec.heights_m[::-1]])
 
     def asked(self, turn: float = 0.0) -> Array:
         """Return the candidates as displacements in the plane and heights over the table.

@@ -97,7 +97,7 @@ class GeometricModel:
         assert percept is not None, "begin() comes first"
         table_z = self._spec.table_height_m
         if is_far:
-            places = asked + (self._target[0], self._target[1], table_z)
+            places = asked + np.array([self._target[0], self._target[1], table_z])
         else:
             places = self._target + shaped(asked, self._target[2] - table_z, self._stride)
         np.clip(places, self._low, self._high, out=places)
@@ -110,7 +110,8 @@ class GeometricModel:
         return distances
 
     def observe(self, intent: Heading, result: StepResult, *, is_learning: bool) -> None:
-        """Remember where the target is."""
+        """Remember where the target is, and how far a step carried it."""
+        del is_learning  # nothing here is learnt
         target = np.array(result.executed.target_m)
         longest = self._spec.max_step_m
         rise = intent.height_m + self._spec.table_height_m - self._target[2]

@@ -1,5 +1,6 @@
 """Small networks: torch trains them, numpy rates with the very same memory. Weights come from a numpy generator."""
 
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -51,7 +52,7 @@ class Network:
 
     def __init__(self, sizes: tuple[int, ...], *, learning_rate: float, rng: np.random.Generator) -> None:
         layers: list[nn.Module] = []
-        for i, (n_in, n_out) in enumerate(zip(sizes[:-1], sizes[1:], strict=True)):
+        for i, (n_in, n_out) in enumerate(pairwise(sizes)):
             layers += ([nn.ReLU()] if i else []) + [nn.Linear(n_in, n_out)]
         self.model = nn.Sequential(*layers)
         self._parameters = list(self.model.parameters())
