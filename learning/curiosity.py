@@ -5,6 +5,7 @@ blocked a goal (it presses neither), nor that something is needed no longer (it 
 shows, if the epoch's goal can still be achieved after it.
 """
 
+from collections.abc import Iterator
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -41,6 +42,38 @@ class Probe(NamedTuple):
                 return step
             on_the_way |= 1 << step
         return None
+
+
+def random_walks(
+    start: Situation, graph: Graph, *, n_walks: int, length: int, rng: np.random.Generator
+) -> Iterator[tuple[tuple[int, ...], Situation]]:
+    """Yield goals achieved and situation reached, at each of less than length steps, over what is believed allowed."""
+    for _ in range(n_walks):
+        steps, here = (), start
+        while len(steps) < length:
+            yield steps, here
+            ways = [
+                i for i in range(graph.n_goals) if not here.latched >> i & 1 and graph.most_probable(i).allow(here)
+            ]
+            if not ways:
+                break
+            step = ways[int(rng.integers(len(ways)))]
+            steps, here = (*steps, step), here.after(step, graph.undone(step))
+
+
+def most_hopeful_step(
+    goal: int, start: Situation, graph: Graph, *, n_walks: int, length: int, rng: np.random.Generator
+) -> int:
+    """Return the first step towards where a goal has the best chance per trial, the goal itself if that is here.
+
+    For a goal of which it is not known what it needs: what is cheap to try comes first, and each failure moves on.
+    """
+    best, best_value = goal, 0.0
+    for steps, here in random_walks(start, graph, n_walks=n_walks, length=length, rng=rng):
+        value = graph.beliefs[goal].predict_allowed(here) / (len(steps) + 1)
+        if value > best_value and not (steps and goal in steps):
+            best, best_value = steps[0] if steps else goal, value
+    return best
 
 
 class Curiosity:
@@ -95,20 +128,16 @@ class Curiosity:
     def _most_doubtful(self, goal: int, graph: Graph) -> Probe | None:
         """Return the probe of most doubt per trial that is met on random walks, or None where there is little doubt."""
         best, best_value = None, 0.0
-        for _ in range(N_WALKS):
-            here, steps = START, ()
-            while len(steps) < self._config.probe_trials:
-                doubts = self._doubts(here, graph)
-                doubtful = int(np.argmax(doubts))
-                value = float(doubts[doubtful]) / (len(steps) + 1)
-                probe = Probe((*steps, doubtful), here)
-                if doubts[doubtful] >= self._config.least_doubt and value > best_value and self._fits(probe, goal, graph):
-                    best, best_value = probe, value
-                ways = [i for i in range(graph.n_goals) if not here.latched >> i & 1 and graph.most_probable(i).allow(here)]
-                if not ways:
-                    break
-                step = ways[int(self._rng.integers(len(ways)))]
-                here, steps = here.after(step, graph.undone(step)), (*steps, step)
+        known: dict[Situation, np.ndarray] = {}
+        for steps, here in random_walks(START, graph, n_walks=N_WALKS, length=self._config.probe_trials, rng=self._rng):
+            if here not in known:
+                known[here] = self._doubts(here, graph)
+            doubtful = int(np.argmax(known[here]))
+            doubt = float(known[here][doubtful])
+            value = doubt / (len(steps) + 1)
+            probe = Probe((*steps, doubtful), here)
+            if doubt >= self._config.least_doubt and value > best_value and self._fits(probe, goal, graph):
+                best, best_value = probe, value
         return best
 
     def _retest(self, graph: Graph) -> Probe | None:

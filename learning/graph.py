@@ -15,6 +15,7 @@ from learning.preconditions import START, Belief, Evidence, Likelihood, Needs, S
 __all__ = ["Finding", "Graph"]
 
 LEAST_SKILL = 0.05
+KNOWN = 0.5
 BEGINNERS_LUCK = 0.15
 """Chance that an expert without one success achieves its goal in a trial where it is allowed."""
 LOSS = 0.02
@@ -170,9 +171,14 @@ class Graph:
         """Return the goals, as a bit mask, that achieving a goal is taken to lose."""
         return sum(1 << k for k, loss in enumerate(self.losses()[goal]) if loss >= 0.5)
 
-    def follow(self, steps: tuple[int, ...]) -> Situation:
-        """Return the situation after goals were achieved one after the other from the start."""
-        here = START
+    def is_known(self, goal: int, start: Situation) -> bool:
+        """Whether there is a plan at whose end the goal is more probably allowed than not."""
+        plan = self.plan(goal, start)
+        return plan is not None and self.beliefs[goal].predict_allowed(self.follow(plan[:-1], start)) >= KNOWN
+
+    def follow(self, steps: tuple[int, ...], start: Situation = START) -> Situation:
+        """Return the situation after goals were achieved one after the other."""
+        here = start
         for step in steps:
             here = here.after(step, self.undone(step))
         return here

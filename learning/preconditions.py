@@ -88,16 +88,24 @@ class Belief:
         weights = np.exp(-literal_cost * n_literals)
         self._prior = weights / weights.sum()
         self._n_goals = n_goals
-        self.probabilities = self._prior.copy()
-        """Posterior, in the order of `conjunctions`.  (h,)"""
+        self._believe(self._prior.copy())
 
     def allows(self, situation: Situation) -> np.ndarray:
         """Return which conjunctions allow the goal in a situation.  () -> (h,)"""
         return ((self._on & ~situation.holds) | (self._off & situation.latched)) == 0
 
+    def _believe(self, probabilities: np.ndarray) -> None:
+        self.probabilities = probabilities
+        """Posterior, in the order of `conjunctions`.  (h,)"""
+        best = int(np.argmax(probabilities))
+        self.most_probable = self._needs(best)
+        """The most probable conjunction, of fewest literals among equals."""
+        self.confidence = float(probabilities[best])
+        """Its probability."""
+
     def mix_with_prior(self, hazard: float) -> None:
         """Take the needs to have been drawn anew with this chance."""
-        self.probabilities = (1.0 - hazard) * self.probabilities + hazard * self._prior
+        self._believe((1.0 - hazard) * self.probabilities + hazard * self._prior)
 
     def update(self, evidence: Evidence, likelihood: Likelihood, *, weight: float = 1.0) -> float:
         """Apply Bayes' rule to one attempt and return the chance that had been given to its result.
@@ -118,18 +126,13 @@ class Belief:
             factors = np.where(allowed, 1.0 - p_hit, 1.0 - fp).mean(axis=0)
         expected = float(self.probabilities @ factors)
         posterior = self.probabilities * factors**weight
-        self.probabilities = posterior / posterior.sum()
+        self._believe(posterior / posterior.sum())
         return expected
 
     def sample(self, rng: np.random.Generator) -> Needs:
         """Draw a conjunction from the posterior."""
         cumulated = np.cumsum(self.probabilities)
         return self._needs(int(np.searchsorted(cumulated, rng.random() * cumulated[-1], side="right")))
-
-    def most_probable(self) -> tuple[Needs, float]:
-        """Return the most probable conjunction (the one of fewest literals among equals) and its probability."""
-        best = int(np.argmax(self.probabilities))
-        return self._needs(best), float(self.probabilities[best])
 
     def predict_allowed(self, situation: Situation) -> float:
         """Return the probability that the goal is allowed in a situation."""
@@ -152,4 +155,4 @@ class Belief:
 
     def load_state_dict(self, state: dict[str, Any]) -> None:
         """Restore bit for bit."""
-        self.probabilities = np.array(state["probabilities"], dtype=float)
+        self._believe(np.array(state["probabilities"], dtype=float))

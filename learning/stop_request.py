@@ -34,6 +34,4 @@ class StopRequest:
         if self.is_made:
             raise KeyboardInterrupt
         self.is_made = True
-        self._report(
-            "stopping after this epoch (once more: at once, losing what came after the last checkpoint)"
-        )
+        self._report("stopping after this epoch (once more: at once, losing what came after the last checkpoint)")

@@ -12,14 +12,16 @@ from typing import Any
 import numpy as np
 
 from config.learning import SubgoalSelection
-from learning.curiosity import Curiosity
+from learning.curiosity import Curiosity, most_hopeful_step
 from learning.graph import Graph
 from learning.interfaces import Attempt, GoalState
 from learning.preconditions import Situation, mask
 
 __all__ = ["GraphSelector"]
 
-N_DRAWS = 4
+N_WALKS = 20
+WALK = 6
+N_DRAWS = 6
 """Draws tried before a goal counts as out of reach in this goal-state."""
 
 
@@ -41,7 +43,7 @@ class GraphSelector:
             raise ValueError("expected at least one available sub-goal, got none")
         here = Situation(mask(state) & ~mask(available), mask(state))
         step = self._explore(goal, here) if explore else self._exploit(goal, here)
-        return step if available[step] else self._most_doubtful(here, available)
+        return step if available[step] else available.index(True)
 
     def _exploit(self, goal: int, here: Situation) -> int:
         """Return the first step of the most probable plan, or the goal itself where there is none."""
@@ -51,21 +53,22 @@ class GraphSelector:
     def _explore(self, goal: int, here: Situation) -> int:
         """Return a step out of curiosity, else the first step of a plan under drawn needs.
 
-        Where the goal seems out of reach there is nothing to lose: what there is most to learn from is tried.
+        Where the goal seems out of reach, anything is tried that the drawn needs allow: there is nothing to lose.
         """
         step = self._curiosity.step(goal, here, self.graph)
         if step is not None:
             return step
+        if not self.graph.is_known(goal, here):
+            return most_hopeful_step(goal, here, self.graph, n_walks=N_WALKS, length=WALK, rng=self._rng)
+        needs_of = self.graph.draw(self._rng)
         for _ in range(N_DRAWS):
-            plan = self.graph.plan(goal, here, self.graph.draw(self._rng))
+            plan = self.graph.plan(goal, here, needs_of)
             if plan:
                 return plan[0]
-        return self._most_doubtful(here, tuple(not here.holds >> i & 1 for i in range(self.graph.n_goals)))
-
-    def _most_doubtful(self, here: Situation, available: tuple[bool, ...]) -> int:
-        """Return the available goal of which it is least known whether it is allowed."""
-        doubts = np.abs(self.graph.predict_allowed(here) - 0.5)
-        return int(np.argmin(np.where(available, doubts, np.inf)))
+            needs_of = self.graph.draw(self._rng)
+        missing = [i for i in range(self.graph.n_goals) if not here.holds >> i & 1]
+        allowed = [i for i in missing if needs_of(i).allow(here)] or missing
+        return allowed[int(self._rng.integers(len(allowed)))]
 
     def update(self, attempt: Attempt) -> None:
         """Learn from one trial. Void attempts change nothing."""

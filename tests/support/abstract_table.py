@@ -284,7 +284,6 @@ def is_graph_right(selector: SubgoalSelector, rules: Rules) -> bool:
         (selector.graph.beliefs[g].predict_allowed(_situation(state)) > 0.5) == rules[g].allow(_situation(state))
         for state in reachable_states(rules)
         for g in range(len(rules))
-        if not state >> g & 1
     )
 
 
