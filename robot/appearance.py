@@ -66,11 +66,15 @@ def dress_arm(body: mujoco.MjsBody, i: int, T: Array | None = None) -> None:
 def dress_tool(body: mujoco.MjsBody, arm: ArmConfig) -> None:
     """Add the visible palm of a parallel-jaw gripper."""
     end = arm.tool.tcp_m[2] - arm.tool.finger_depth_m
-    _add_parts(body, (((0, 0, 0), (0, 0, 0.014), 0.0375, STEEL), ((0, 0, 0.014), (0, 0, 0.022), 0.036, BLUE)), np.eye(4))
+    _add_parts(
+        body, (((0, 0, 0), (0, 0, 0.014), 0.0375, STEEL), ((0, 0, 0.014), (0, 0, 0.022), 0.036, BLUE)), np.eye(4)
+    )
     box = mujoco.mjtGeom.mjGEOM_BOX
     look = {"contype": 0, "conaffinity": 0, "group": 2, "mass": 0}
     waist = 0.5 * (0.022 + end)
-    body.add_geom(type=box, size=[0.031, 0.036, (waist - 0.022) / 2], pos=[0, 0, (0.022 + waist) / 2], rgba=DARK, **look)
+    body.add_geom(
+        type=box, size=[0.031, 0.036, (waist - 0.022) / 2], pos=[0, 0, (0.022 + waist) / 2], rgba=DARK, **look
+    )
     body.add_geom(type=box, size=[0.029, 0.058, (end - waist) / 2], pos=[0, 0, (end + waist) / 2], rgba=DARK, **look)
 
 
