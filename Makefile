@@ -9,7 +9,7 @@ BENCHES := twin grasp learning
 .PHONY: run setup check test test-slow bench clean
 
 run: setup
-	$(BIN)/autotelic learn --scenario paper --rig twin --preset default --seed 0 --out $(RUN)
+	$(BIN)/autotelic learn --scenario paper --rig twin --preset default --seed 0 --out $(RUN) --resume
 
 setup: $(STAMP)
 
