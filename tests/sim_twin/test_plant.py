@@ -57,7 +57,7 @@ def run(plant: TwinPlant, seed: int) -> np.ndarray:
     q = np.array(plant.arm.read().q_rad)
     grip = GripCommand(opening_m=0.02, force_n=20.0, speed_m_s=0.1)
     for k in range(150):
-        q += rng.normal(0.0, 0.004, 6) + (0.0, 0.004, 0.0, 0.0, 0.0, 0.0)
+        q += rng.normal(0.0, 0.004, 6) + np.array([0.0, 0.004, 0.0, 0.0, 0.0, 0.0])
         plant.arm.write(ArmCommand(stamp_ns=0, sequence=k, q_rad=tuple(q), grip=grip, digital_out=LIDS & k))
         plant.arm.clock.wait_tick()
     return np.concatenate([plant.world.data.qpos, plant.world.data.qvel, plant.world.data.sensordata])

@@ -4,6 +4,7 @@ It runs the upper layers as the agent does and measures them by the project's wo
 """
 
 from collections.abc import Sequence
+from itertools import pairwise
 
 import msgspec
 import numpy as np
@@ -254,7 +255,7 @@ def _run_half(table: AbstractTable, learner: Learner, rules: Rules, *, first_epo
             is_mastered_at.append((i, _all_mastered(table, learner, first_epoch + i)))
         if was_looked_at and i % 10 == 0 and not is_graph_right(learner.selector, rules):
             wrong_until = i
-    firsts = [a for (a, ok), (_, also) in zip(is_mastered_at, is_mastered_at[1:], strict=False) if ok and also]
+    firsts = [a for (a, ok), (_, also) in pairwise(is_mastered_at) if ok and also]
     last = rows[-200:]
     optimum = optimal_trials(rules)
     over = [np.mean([n - optimum[g] for g, _, n in last if g == goal] or [0.0]) for goal in range(learner.n_goals)]
@@ -267,7 +268,7 @@ def _run_half(table: AbstractTable, learner: Learner, rules: Rules, *, first_epo
 
 
 def _pairs(evaluations: list[tuple[int, bool]]) -> list[tuple[bool, bool]]:
-    return [(a, b) for (_, a), (_, b) in zip(evaluations, evaluations[1:], strict=False)]
+    return [(a, b) for (_, a), (_, b) in pairwise(evaluations)]
 
 
 def _all_mastered(table: AbstractTable, learner: Learner, epoch: int) -> bool:
