@@ -1,13 +1,33 @@
 """A test of what a run's newest checkpoint holds, apart from the run itself."""
 
 from learning.assembly import RobotLearner
+from learning.errors import LearningError
 from learning.evaluation import GoalTest, evaluation_row, learnt_graph, run_test
+from learning.explain import Explanation, explain_graph
+from learning.graph import Graph
 from learning.metrics import graph_errors, reachable_states
 from learning.rows import EvaluationRow
 from learning.run_folder import RunFolder
 from robot.oracle import rules_oracle
 
-__all__ = ["assess"]
+__all__ = ["assess", "beliefs_of"]
+
+
+def beliefs_of(folder: RunFolder) -> tuple[Explanation, ...]:
+    """Return what a run's newest checkpoint believes each goal needs.
+
+    Raises:
+        RunFolderError: this is no run folder.
+        CheckpointError: no checkpoint can be read.
+        LearningError: the run's sub-goal selector holds no graph.
+    """
+    manifest, config = folder.manifest(), folder.config().learning.subgoal_selection
+    if config.kind != "graph":
+        raise LearningError(f"{folder.path}: expected a run whose sub-goal selector is graph, it is {config.kind}")
+    state, _ = folder.checkpoints.newest()
+    graph = Graph(n_goals=len(manifest.goals), config=config)
+    graph.load_state_dict(state["agent"]["subgoal_selector"]["graph"])
+    return explain_graph(graph)
 
 
 def assess(folder: RunFolder, *, n_tests: int, seed: int | None, rules_epoch: int | None) -> list[EvaluationRow]:

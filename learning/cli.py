@@ -19,7 +19,7 @@ from learning.report import Run, group_runs, load_run, report_of
 from learning.run_folder import RunFolder, run_folders
 from learning.stop_request import StopRequest
 from learning.stopwatch import Stopwatch
-from learning.telling import profile_of, profile_table, report_table, score_table, summary_lines
+from learning.telling import explanation_table, profile_of, profile_table, report_table, score_table, summary_lines
 from learning.wanted import Wanted
 
 if TYPE_CHECKING:
@@ -135,6 +135,24 @@ def evaluate(
         typer.echo(msgspec.json.encode({"goals": goals, "rows": rows}).decode())
     else:
         Console().print(score_table(rows, goals))
+
+
+@_one_line_errors
+def explain(
+    run: Annotated[Path, typer.Argument(help="Run folder.")],
+    *,
+    json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
+) -> None:
+    """Tell what a run's newest checkpoint believes each goal needs, on what evidence, and the plan that follows."""
+    from learning.assess import beliefs_of  # brings torch, seconds that reports do not need
+
+    folder = RunFolder(run)
+    goals = [goal.name for goal in folder.manifest().goals]
+    explanations = beliefs_of(folder)
+    if json:
+        typer.echo(msgspec.json.encode({"goals": goals, "explanations": explanations}).decode())
+    else:
+        Console().print(explanation_table(explanations, goals))
 
 
 @_one_line_errors

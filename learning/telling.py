@@ -5,12 +5,13 @@ from collections.abc import Iterator, Sequence
 from rich.table import Table
 
 from learning.ended import Ended
+from learning.explain import Explanation
 from learning.metrics import EraSummary
 from learning.progress import duration_text
 from learning.report import Count, Report, Run, Spread
 from learning.rows import EvaluationRow
 
-__all__ = ["profile_of", "profile_table", "report_table", "score_table", "summary_lines"]
+__all__ = ["explanation_table", "profile_of", "profile_table", "report_table", "score_table", "summary_lines"]
 
 MICRO = 1e6
 
@@ -63,6 +64,29 @@ def score_table(rows: Sequence[EvaluationRow], goals: Sequence[str]) -> Table:
         trials = f"{row.trials_achieved / row.n_successes:.2f}" if row.n_successes else "–"
         graph = "–" if row.graph_cases is None else f"{row.graph_wrong} of {row.graph_cases} states"
         table.add_row(goals[row.goal], f"{row.n_successes} of {row.n_tests}", trials, graph)
+    return table
+
+
+def explanation_table(explanations: Sequence[Explanation], goals: Sequence[str]) -> Table:
+    """Return a table of what is believed of each goal."""
+    columns = ("goal", "needs", "sure", "for / against", "changed at epoch", "skill", "plan from a fresh table")
+    table = Table(*columns, show_lines=True)
+    for told in explanations:
+        needs = [goals[i] for i in told.needs_on] + [f"not {goals[i]}" for i in told.needs_off]
+        doubts = [
+            f"{'' if literal.is_on else 'not '}{goals[literal.goal]} {literal.probability:.0%}"
+            for literal in told.literals
+            if literal.goal not in (*told.needs_on, *told.needs_off)
+        ]
+        table.add_row(
+            goals[told.goal],
+            "\n".join([*(needs or ["nothing"]), *(f"[dim]perhaps {doubt}[/dim]" for doubt in doubts)]),
+            f"{told.probability:.0%}",
+            f"{told.n_for} / {told.n_against}",
+            "never" if told.changed_epoch is None else str(told.changed_epoch),
+            f"{told.skill:.0%}",
+            " → ".join(goals[i] for i in told.plan) if told.plan else "none known",
+        )
     return table
 
 
