@@ -18,6 +18,7 @@ IN_HAND_M = 0.03
 """An object whose centre is this near the tool centre point of a hand that reports one is the one it holds."""
 ABOVE_M = 0.01
 """Held up this far above an object's top, the tool stands on something that covers it."""
+WALL_MARGIN_M = 0.02
 LIT = 0.5
 
 Achieved = Callable[[Percept], bool]
@@ -99,10 +100,10 @@ class GoalJudge:
         return is_inside and thing.is_valid and place.is_valid and not self._is_grabbed(goal, percept)
 
     def _is_at_box(self, goal: Goal, percept: Percept) -> bool:
-        """Over the inner half of the box, held up or as low as the tool goes."""
+        """Over the box, but for a margin at its walls, held up or as low as the tool goes."""
         assert goal.box is not None, "config checks that an in_box goal names its box"
         place, box, tool = self._find(goal.box, percept), self._boxes[goal.box], percept.tcp_position_m
-        is_over = all(abs(t - p) < side / 4 for t, p, side in zip(tool, place.position_m, box.inner_m, strict=False))
+        is_over = all(abs(t - p) < side / 2 - WALL_MARGIN_M for t, p, side in zip(tool, place.position_m, box.inner_m, strict=False))
         return place.is_valid and is_over and (percept.is_in_contact or tool[2] < self._reached_below_m)
 
     def _find(self, name: str, percept: Percept) -> ObjectPercept:
