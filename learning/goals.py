@@ -103,7 +103,8 @@ class GoalJudge:
         """Over the box, but for a margin at its walls, held up or as low as the tool goes."""
         assert goal.box is not None, "config checks that an in_box goal names its box"
         place, box, tool = self._find(goal.box, percept), self._boxes[goal.box], percept.tcp_position_m
-        is_over = all(abs(t - p) < side / 2 - WALL_MARGIN_M for t, p, side in zip(tool, place.position_m, box.inner_m, strict=False))
+        (x, y, _), (bx, by, _), (side_x, side_y) = tool, place.position_m, box.inner_m
+        is_over = abs(x - bx) < side_x / 2 - WALL_MARGIN_M and abs(y - by) < side_y / 2 - WALL_MARGIN_M
         return place.is_valid and is_over and (percept.is_in_contact or tool[2] < self._reached_below_m)
 
     def _find(self, name: str, percept: Percept) -> ObjectPercept:
