@@ -20,7 +20,7 @@ DROP = 0.3
 
 
 def delta_competence(cp: Sequence[float], window: int) -> float:
-    """Return ΔC^g, equation (1) as printed: the newest window's mean |CP| minus the mean of the window before.  (n,) -> ()
+    """Return ΔC^g, equation (1) as printed: mean |CP| of the newest window minus that of the one before.  (n,) -> ()
 
     CP_i is the expected probability of achieving g, said at the start of the trial, minus what came (1 or 0). The
     equation needs 2·PT attempts; before that nothing can be said about improvement, and 0 is returned.

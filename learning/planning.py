@@ -1,8 +1,8 @@
 """Planning over goal-states: which goals to achieve, in which order, so that a wanted one becomes possible. Pure.
 
 What is achieved stays on, save what gets lost on the way (a hand that takes one thing lets
-go of another), and a goal that something else needs off must wait. A failed attempt leaves the situation as it was: under
-given needs value iteration comes down to the cheapest path, where a step costs the expected number of trials,
+go of another), and a goal that something else needs off must wait. A failed attempt leaves the situation as it was:
+under given needs value iteration comes down to the cheapest path, where a step costs the expected number of trials,
 1 / chance of success.
 """
 
@@ -26,7 +26,7 @@ class Effort(msgspec.Struct, frozen=True, kw_only=True):
     trials: Sequence[float]
     """Expected trials to achieve each goal where nothing blocks it.  (n,)"""
     losses: Sequence[Sequence[float]]
-    """[j][k]: chance that achieving goal j loses goal k. From one half on it is counted on, below it is a cost.  (n, n)"""
+    """[j][k]: chance that achieving goal j loses goal k; from one half on it is counted on, below a cost.  (n, n)"""
 
 
 def cheapest_plan(
