@@ -1,0 +1,98 @@
+import msgspec
+import pytest
+
+from config.loader import load_scenario
+from learning.goals import GoalJudge
+from robot.messages import GripState, ObjectPercept, Percept
+from tests.support.kinematic_table import KinematicTable
+
+ORANGE, GREEN, BLUE, RED_GRABBED, BLUE_GRABBED, IN_BOX = range(6)
+PLACES = {
+    "orange_button": (0.3, -0.2, 0.04), "green_button": (0.3, 0.0, 0.04), "blue_button": (0.3, 0.2, 0.04),
+    "red_box": (0.54, -0.25, 0.0), "square_box": (0.54, 0.0, 0.0), "blue_box": (0.54, 0.25, 0.0),
+    "red_cylinder": (0.54, -0.25, 0.03), "blue_cylinder": (0.54, 0.25, 0.03),
+}  # fmt: skip
+OPEN = GripState(opening_m=0.085, is_moving=False, has_object=False)
+FULL = GripState(opening_m=0.044, is_moving=False, has_object=True)
+
+
+@pytest.fixture(scope="module")
+def judge() -> GoalJudge:
+    scenario = load_scenario("paper")
+    return GoalJudge(scenario, KinematicTable(scenario).spec)
+
+
+def percept(*, tool=(0.42, 0.0, 0.2), grip=OPEN, lit=(0, 0, 0), contact=False, **moved) -> Percept:
+    places = PLACES | moved
+    n = 12
+    return Percept(
+        stamp_ns=0, distances_m=(0.5,) * 9, button_states=tuple(float(s) for s in lit), ages_s=(0.0,) * n,
+        valid=(True,) * n,
+        objects=tuple(
+            ObjectPercept(name=k, position_m=v, quat=(1.0, 0.0, 0.0, 0.0), age_s=0.0, is_valid=True)
+            for k, v in places.items()
+        ),
+        tcp_position_m=tool, grip=grip, is_in_contact=contact,
+    )  # fmt: skip
+
+
+def test_on_a_fresh_table_no_goal_holds(judge):
+    assert judge.achieved(percept()) == (False,) * 6
+
+
+def test_a_button_is_pressed_while_its_lamp_is_lit(judge):
+    assert judge.achieved(percept(lit=(0, 1, 0)))[:3] == (False, True, False)
+
+
+def test_a_cylinder_is_grabbed_when_a_full_hand_is_around_that_very_one(judge):
+    at_blue = percept(tool=(0.54, 0.25, 0.03), grip=FULL)
+    assert judge.achieved(at_blue)[RED_GRABBED : BLUE_GRABBED + 1] == (False, True)
+    assert not judge.achieved(percept(tool=(0.54, 0.25, 0.03), grip=OPEN))[BLUE_GRABBED]
+    assert not judge.achieved(percept(tool=(0.54, 0.25, 0.07), grip=FULL))[BLUE_GRABBED]
+
+
+def test_in_the_box_counts_only_once_the_hand_let_go(judge):
+    inside = {"blue_cylinder": (0.56, 0.02, 0.03)}
+    assert judge.achieved(percept(**inside))[IN_BOX]
+    assert not judge.achieved(percept(tool=(0.56, 0.02, 0.03), grip=FULL, **inside))[IN_BOX]
+
+
+@pytest.mark.parametrize("place", [(0.54, 0.1, 0.03), (0.64, 0.0, 0.03), (0.54, 0.0, 0.13)])
+def test_beside_the_box_or_on_its_lid_is_not_in_it(judge, place):
+    assert not judge.achieved(percept(blue_cylinder=place))[IN_BOX]
+
+
+def test_held_up_over_a_shut_lid_is_being_at_the_cylinders_place(judge):
+    assert judge.is_at_place(RED_GRABBED, percept(tool=(0.55, -0.24, 0.093), contact=True))
+    assert not judge.is_at_place(RED_GRABBED, percept(tool=(0.55, -0.24, 0.093), contact=False))
+    assert not judge.is_at_place(RED_GRABBED, percept(tool=(0.50, -0.24, 0.093), contact=True))
+
+
+def test_held_up_by_the_cylinder_itself_is_a_miss_and_not_a_block(judge):
+    assert not judge.is_at_place(RED_GRABBED, percept(tool=(0.55, -0.24, 0.068), contact=True))
+
+
+def test_a_hand_that_moves_or_holds_something_else_proves_nothing(judge):
+    over_red = {"tool": (0.54, -0.25, 0.093), "contact": True}
+    moving = msgspec.structs.replace(OPEN, is_moving=True)
+    assert not judge.is_at_place(RED_GRABBED, percept(grip=moving, **over_red))
+    holding_blue = {"blue_cylinder": (0.54, -0.25, 0.095)}
+    assert not judge.is_at_place(RED_GRABBED, percept(grip=FULL, **over_red, **holding_blue))
+
+
+def test_over_a_box_held_up_with_or_without_the_object_is_at_its_place(judge):
+    assert judge.is_at_place(IN_BOX, percept(tool=(0.59, 0.03, 0.1), contact=True))
+    carrying = {"blue_cylinder": (0.59, 0.03, 0.105)}
+    assert judge.is_at_place(IN_BOX, percept(tool=(0.59, 0.03, 0.1), grip=FULL, contact=True, **carrying))
+    assert judge.is_at_place(IN_BOX, percept(tool=(0.54, 0.0, 0.026)))
+    assert not judge.is_at_place(IN_BOX, percept(tool=(0.54, 0.0, 0.2)))
+
+
+def test_what_is_not_valid_is_not_judged(judge):
+    lit = percept(lit=(1, 0, 0))
+    blind = msgspec.structs.replace(lit, valid=(False,) * 12)
+    assert judge.achieved(lit)[ORANGE]
+    assert not judge.achieved(blind)[ORANGE]
+    unseen = tuple(msgspec.structs.replace(o, is_valid=False) for o in lit.objects)
+    at_blue = msgspec.structs.replace(percept(tool=(0.54, 0.25, 0.03), grip=FULL), objects=unseen)
+    assert not judge.achieved(at_blue)[BLUE_GRABBED]
