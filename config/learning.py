@@ -69,7 +69,7 @@ class SubgoalSelection(Section, frozen=True, kw_only=True):
     curiosity: Share = 0.0
     """Chance per epoch that a doubtful precondition is tried out before the plan is followed."""
     least_doubt: Share = 0.1
-    """Least chance of being wrong that makes a precondition doubtful enough for that."""
+    """Least chance of being wrong, per trial that it takes to find out, that makes a precondition worth that."""
     probe_trials: Count = 6
     """Most trials that trying it out and following the plan may take together."""
     retest: Share = 0.0
@@ -92,6 +92,8 @@ class Expert(Section, frozen=True, kw_only=True):
     """Successes after which the expert alone moves the arm."""
     relevance_power: NonNegative = 3.0
     """How sharply inputs are weighted by how steady their distance was at success; 0 weighs all alike."""
+    relevance_until: Count = 10
+    """Successes up to which the weights change with each, later only now and then, and never of a settled expert."""
     failure_tail: Count = 20
     """Time steps at the end of a failed trial that are learnt as worthless."""
     failure_weight: NonNegative = 4.0
@@ -99,14 +101,16 @@ class Expert(Section, frozen=True, kw_only=True):
     expectile: Share = 0.8
     """Above 0.5, better traces through a place count for more than worse ones."""
     boredom: NonNegative = 0.004
-    """Utility taken off places like those of the last steps, each."""
+    """Utility taken off places like those of the trial's steps, for each; more where nothing moved."""
     boredom_sigma: Positive = 0.05
     horizon: Count = 70
     """Steps over which utility falls from 1 to 0 along a success trace."""
     failure_share: Share = 0.3
     """Share of failures in a batch."""
-    refresh_every: Count = 10
-    """A settled expert is trained only every so many trials, or when it fails."""
+    settled_misses: Annotated[int, Meta(ge=0, le=20)] = 1
+    """An expert that failed no more often than this in its last 20 trials is left as it is."""
+    rate_half: Positive = 20.0
+    """Successes after which the learning rate is half of what it was at first."""
     scales_m: Annotated[tuple[Span, ...], Meta(max_length=4)] = (0.1, 0.03)
     """Ranges of the exponentials that a distance is normalised by."""
 

@@ -30,8 +30,8 @@ STUCK_M = 0.004
 DETOUR_STEPS = 15
 REST_STEPS = 10
 """Steps of a trial, and after a detour, before a model can count as stuck."""
-SEEN = 24
-"""Steps that boredom remembers."""
+STILL_STEPS = 5
+"""Nothing moves when no distance changed by more than STUCK_M in so many steps."""
 REMEMBER_EVERY = 4
 
 
@@ -63,9 +63,15 @@ class ExpertSet:
         """Normalised P's that the moves of this trial were to lead to."""
         self._distances_m: list[Array] = []
         self._seen: list[Array] = []
-        self._came_about: list[int] = []
+        self._dwelt: list[float] = []
+        """How much each of the places seen bores: more, the longer nothing has moved."""
+        self._dead_ends: list[Array] = []
+        self._came_about: list[tuple[int, Array, Array]] = []
+        """Goals that came about, each with its trace and the distances at its end."""
         self._n_steps = 0
         self._detour = 0
+        self._was_stuck = False
+        self._n_still = 0
         self._rested_at = REST_STEPS
 
     def begin_trial(self, subgoal: int, percept: Percept, *, explore: bool) -> None:
@@ -82,8 +88,9 @@ class ExpertSet:
     def act(self, percept: Percept) -> Heading:
         """Return the next intent."""
         states = np.array(percept.button_states, dtype=np.float32)
+        self._note_stillness(percept)
         if self._is_exploring and self._is_by_model:
-            self._note_stuck(percept)
+            self._note_stuck()
         if self._is_by_model and not self._detour:
             asked, x = self._best(states)
         else:
@@ -102,28 +109,40 @@ class ExpertSet:
         x = normalised(self._forward.predict(asked), states, self._scales_m)
         utility = model.rate(x) - self._boredom(x * model.weights)
         best = int(np.argmax(utility))
-        self._seen = [*self._seen[-(SEEN - 1) :], x[best] * model.weights]
+        self._seen.append(x[best] * model.weights)
+        self._dwelt.append(1.0 + self._n_still)
         return asked[best], x[best]
 
     def _boredom(self, x: Array) -> Array:
         """Return what is taken off places like those just asked for: no ripple of a model holds the arm for good.
 
-        boredom * sum over the last steps of exp(-|x - seen|^2 / (2 sigma^2)).  (k, n_inputs) -> (k,)
+        boredom * sum over the trial's steps of dwelt * exp(-|x - seen|^2 / (2 sigma^2)).  (k, n_inputs) -> (k,)
         """
         if not self._seen or not self._config.boredom:
             return np.zeros(len(x), dtype=np.float32)
         seen = np.array(self._seen)
         apart = (x * x).sum(axis=1)[:, None] - 2.0 * x @ seen.T + (seen * seen).sum(axis=1)
-        return self._config.boredom * np.exp(apart * (-0.5 / self._config.boredom_sigma**2)).sum(axis=1)
+        return self._config.boredom * (np.exp(apart * (-0.5 / self._config.boredom_sigma**2)) @ np.array(self._dwelt))
 
-    def _note_stuck(self, percept: Percept) -> None:
+    def _note_stillness(self, percept: Percept) -> None:
+        """Count the steps in which nothing moved; a hand at work is no stillness."""
+        self._distances_m.append(np.array(percept.distances_m))
+        is_still = not percept.grip.is_moving and self._change(STILL_STEPS) < STUCK_M
+        self._n_still = self._n_still + 1 if is_still else 0
+
+    def _change(self, n_steps: int) -> float:
+        """Return the greatest change of a distance between now and so many steps ago, infinite if that is too early."""
+        if len(self._distances_m) < n_steps:
+            return np.inf
+        return float(np.abs(self._distances_m[-1] - self._distances_m[-n_steps]).max())
+
+    def _note_stuck(self) -> None:
         """A model that holds the arm where nothing happens is shown its error, and curiosity takes over for a while."""
-        self._distances_m = [*self._distances_m[-(STUCK_STEPS - 1) :], np.array(percept.distances_m)]
-        if self._detour or self._n_steps <= self._rested_at or len(self._distances_m) < STUCK_STEPS:
+        is_early = self._n_steps <= self._rested_at
+        if self._detour or is_early or not self._n_still or self._change(STUCK_STEPS) >= STUCK_M:
             return
-        if np.abs(self._distances_m[-1] - self._distances_m[0]).max() >= STUCK_M:
-            return
-        self._models[self._subgoal].fail(np.array(self._trace[-STUCK_STEPS:]))
+        self._was_stuck = True
+        self._dead_ends.append(np.array(self._trace[-STUCK_STEPS:]))
         self._trace = self._trace[-1:]
         self._detour = DETOUR_STEPS
         self._rested_at = self._n_steps + DETOUR_STEPS + REST_STEPS
@@ -139,25 +158,29 @@ class ExpertSet:
             self._memory.add(self._trace[-1])
         for goal, is_achieved in enumerate(achieved):
             if is_achieved:
-                self._came_about.append(goal)
-                end_m = np.array(result.percept.distances_m)
-                self._models[goal].succeed(np.array(self._trace), end_m, is_own=goal == self._subgoal)
+                self._came_about.append((goal, np.array(self._trace), np.array(result.percept.distances_m)))
 
     def end_trial(self, outcome: TrialOutcome) -> None:
-        """Close the trial and train; a blocked trial says nothing against the skill, a void one nothing at all."""
+        """Close the trial, learn what it showed and train.
+
+        A blocked trial says nothing against the skill, not even where the arm got stuck; a void one nothing at all.
+        """
         if not self._is_exploring or outcome is TrialOutcome.VOID:
             return
         model = self._models[self._subgoal]
         is_missed = outcome is TrialOutcome.NOT_REACHED
-        if is_missed and self._trace:
-            model.fail(np.array(self._trace))
+        for goal, trace, end_m in self._came_about:
+            self._models[goal].succeed(trace, end_m, is_own=goal == self._subgoal)
         if outcome is not TrialOutcome.BLOCKED:
+            for dead_end in self._dead_ends:
+                model.fail(dead_end)
+            if is_missed and self._trace:
+                model.fail(np.array(self._trace))
             if self._is_by_model:
-                model.count(is_success=not is_missed)
-            model.train(is_surprised=is_missed)
-        for goal in self._came_about:
-            if goal != self._subgoal:
-                self._models[goal].train(is_surprised=True)
+                model.count(is_success=not is_missed, is_clean=not is_missed and not self._was_stuck)
+            model.train()
+        for goal in sorted({goal for goal, _, _ in self._came_about} - {self._subgoal}):
+            self._models[goal].train()
         self._forward.train()
 
     def utility(self, subgoal: int, percept: Percept) -> float:

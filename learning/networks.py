@@ -62,6 +62,15 @@ class Network:
             view[...] = rng.uniform(-bound, bound, view.shape)
         self.optimiser = torch.optim.Adam(self._parameters, lr=learning_rate, betas=(0.9, 0.99), eps=1e-5, fused=True)
 
+    @property
+    def learning_rate(self) -> float:
+        """Adam's step."""
+        return self.optimiser.param_groups[0]["lr"]
+
+    @learning_rate.setter
+    def learning_rate(self, rate: float) -> None:
+        self.optimiser.param_groups[0]["lr"] = rate
+
     def rate(self, x: Array) -> Array:
         """Return the network's output for each row.  (k, n_in) float32 -> (k, n_out)"""
         weights = self._views

@@ -63,7 +63,8 @@ class UtilityModel:
         self.weights = np.ones(n_inputs, dtype=np.float32)
         """Relevance of each input."""
         self._recent: list[bool] = []
-        self._since_trained = 0
+        self._clean: list[bool] = []
+        """Trials that succeeded by the model alone, the newest ones."""
         self._usual_start = 0.5
         """Utility at the starts of trials that succeeded."""
         self.n_successes = 0
@@ -84,8 +85,8 @@ class UtilityModel:
 
     @property
     def is_settled(self) -> bool:
-        """Whether the last trials all succeeded: there is little left to learn."""
-        return len(self._recent) >= WINDOW and all(self._recent)
+        """Whether nearly all the last trials succeeded by the model alone: it is left as it is."""
+        return len(self._clean) >= WINDOW and len(self._clean) - sum(self._clean) <= self._config.settled_misses
 
     @property
     def skill(self) -> float:
@@ -101,27 +102,38 @@ class UtilityModel:
             self._usual_start += 0.1 * (start - self._usual_start)
         self._successes.add(rows, trace_utilities(len(rows), self._config.horizon))
         self._ends_m = [*self._ends_m[-(N_ENDS - 1) :], end_m.tolist()]
-        if len(self._ends_m) >= FEW_ENDS:
-            weights = relevance(np.array(self._ends_m), self._config.relevance_power)
-            self.weights[: -self._n_states or None] = np.tile(weights, 1 + len(self._config.scales_m))
+        self._weigh()
+
+    def _weigh(self) -> None:
+        """Tell relevance anew while successes are few, then now and then until the model is settled.
+
+        New weights are a new meaning of every input: a model that works keeps those it was trained with.
+        """
+        n = self.n_successes
+        is_due = n <= self._config.relevance_until or (n % WINDOW == 0 and not self.is_settled)
+        if n < FEW_ENDS or not is_due:
+            return
+        self._clean = []
+        weights = relevance(np.array(self._ends_m), self._config.relevance_power)
+        self.weights[: -self._n_states or None] = np.tile(weights, 1 + len(self._config.scales_m))
 
     def fail(self, trace: Array) -> None:
         """Take in the end of a trace that came to nothing.  (k, n_inputs)"""
         rows = trace[-self._config.failure_tail :]
         self._failures.add(rows, np.zeros(len(rows)))
 
-    def count(self, *, is_success: bool) -> None:
-        """Count a trial that nothing blocked."""
+    def count(self, *, is_success: bool, is_clean: bool | None = None) -> None:
+        """Count a trial that nothing blocked; a clean success is the model's alone."""
+        self._clean = [*self._clean[-(WINDOW - 1) :], is_success if is_clean is None else is_clean]
         self._recent = [*self._recent[-(WINDOW - 1) :], is_success]
 
-    def train(self, *, is_surprised: bool) -> None:
-        """Fit the network a little; a settled model that met no surprise only now and then."""
+    def train(self) -> None:
+        """Fit the network a little, more carefully the more it has seen; a settled one is left as it is."""
         if self._successes.n == 0:
             return
-        self._since_trained += 1
-        if self.is_settled and not is_surprised and self._since_trained < self._config.refresh_every:
+        if self.is_settled:
             return
-        self._since_trained = 0
+        self._network.learning_rate = self._config.learning_rate / (1.0 + self.n_successes / self._config.rate_half)
         for _ in range(self._config.updates_per_trial):
             self._update()
 
@@ -165,7 +177,7 @@ class UtilityModel:
             "ends_m": np.array(self._ends_m, dtype=float).reshape(-1, self._n_distances),
             "weights": self.weights.copy(),
             "recent": list(self._recent),
-            "since_trained": self._since_trained,
+            "clean": list(self._clean),
             "usual_start": self._usual_start,
             "n_successes": self.n_successes,
             "rng": self._rng.bit_generator.state,
@@ -179,7 +191,7 @@ class UtilityModel:
         self._ends_m = np.array(state["ends_m"]).tolist()
         self.weights[:] = state["weights"]
         self._recent = list(state["recent"])
-        self._since_trained = int(state["since_trained"])
+        self._clean = list(state["clean"])
         self._usual_start = float(state["usual_start"])
         self.n_successes = int(state["n_successes"])
         self._rng.bit_generator.state = state["rng"]

@@ -49,7 +49,7 @@ def taught(model: UtilityModel, n: int = 12) -> UtilityModel:
         x, end = approach(rng)
         model.succeed(x, end, is_own=True)
         model.count(is_success=True)
-        model.train(is_surprised=True)
+        model.train()
     return model
 
 
@@ -85,14 +85,25 @@ def test_skill_is_the_share_of_the_newest_trials_that_succeeded():
     assert model.skill == pytest.approx((15 + 0.2) / 21)
 
 
-def test_a_settled_model_trains_only_now_and_then_and_on_surprise():
-    model = taught(make(), n=20)
+def test_a_settled_model_is_left_as_it_is_until_it_fails_again():
+    model = taught(make(), n=40)
     assert model.is_settled
-    before = model.state_dict()["network"]["weights"][0].copy()
-    model.train(is_surprised=False)
-    assert (model.state_dict()["network"]["weights"][0] == before).all()
-    model.train(is_surprised=True)
-    assert (model.state_dict()["network"]["weights"][0] != before).any()
+    before = weights_of(model)[0].copy()
+    model.count(is_success=False)
+    model.train()
+    assert (weights_of(model)[0] == before).all()
+    model.count(is_success=False)
+    model.train()
+    assert (weights_of(model)[0] != before).any()
+
+
+def test_a_settled_model_keeps_the_weights_it_was_trained_with():
+    model = taught(make(), n=40)
+    before = model.weights.copy()
+    for k in range(25):
+        x, end = approach(np.random.default_rng(100 + k))
+        model.succeed(x, end + np.array([0.3 * (k % 2), 0.0, 0.0]), is_own=False)
+    assert (model.weights == before).all()
 
 
 def weights_of(model: UtilityModel) -> list[np.ndarray]:
@@ -112,7 +123,7 @@ def test_saved_loaded_and_continued_is_as_if_it_had_never_stopped():
         x, end = approach(np.random.default_rng(77))
         model.succeed(x, end, is_own=True)
         model.fail(x)
-        model.train(is_surprised=True)
+        model.train()
     assert all((a == b).all() for a, b in zip(weights_of(whole), weights_of(resumed), strict=True))
     place = approach(np.random.default_rng(1))[0]
     assert (whole.rate(place) == resumed.rate(place)).all()
