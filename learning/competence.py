@@ -50,7 +50,7 @@ def running_success(results: Sequence[float], window: int) -> float:
 
 def has_dropped(results: Sequence[float], window: int) -> bool:
     """Whether success fell by more than DROP, newest half-window against the window before it.  (n,) -> ()"""
-    half = window // 2
+    half = max(1, window // 2)
     if len(results) < half + window:
         return False
     newest, before = results[-half:], results[-half - window : -half]

@@ -14,11 +14,15 @@ from config.learning import SubgoalSelection
 from learning.graph import Finding, Graph
 from learning.preconditions import START, Needs, Situation
 
-__all__ = ["Curiosity", "Probe"]
+__all__ = ["Curiosity", "Probe", "most_hopeful_step", "random_walks"]
 
 N_WALKS = 6
 FADE = 0.998
 """How much of the memory of past probes is left after an epoch."""
+WAKING = 0.5
+"""Share of curiosity that one surprise brings back."""
+TIRING = 0.97
+"""How much of it is left after a probe."""
 SURPRISE = 0.1
 """A result that had been given less than this chance is suspect."""
 
@@ -52,9 +56,7 @@ def random_walks(
         steps, here = (), start
         while len(steps) < length:
             yield steps, here
-            ways = [
-                i for i in range(graph.n_goals) if not here.latched >> i & 1 and graph.most_probable(i).allow(here)
-            ]
+            ways = [i for i in range(graph.n_goals) if not here.latched >> i & 1 and graph.most_probable(i).allow(here)]
             if not ways:
                 break
             step = ways[int(rng.integers(len(ways)))]
@@ -87,6 +89,8 @@ class Curiosity:
         """How often probed; what stays doubtful though probed gets boring."""
         self._suspects: set[_Spot] = set()
         """Where the last result was a surprise."""
+        self._interest = 1.0
+        """Share of the configured curiosity; fruitless probes tire it, surprises wake it."""
 
     def step(self, goal: int, here: Situation, graph: Graph) -> int | None:
         """Return what to try for curiosity's sake while an epoch's goal is pursued, or None."""
@@ -104,6 +108,7 @@ class Curiosity:
             self._tries = {key: n for key, n in self._tries.items() if key[0] != finding.goal}
         if finding.expected < SURPRISE:
             self._suspects.add(at)
+            self._interest = min(1.0, self._interest + WAKING)
         else:
             self._suspects.discard(at)
 
@@ -115,28 +120,28 @@ class Curiosity:
         chance = self._rng.random()
         if chance < self._config.retest:
             probe = self._retest(graph)
-        elif chance < self._config.retest + self._config.curiosity:
+        elif chance < self._config.retest + self._config.curiosity * self._interest:
             probe = self._most_doubtful(goal, graph)
         else:
             probe = None
         if probe is None or not self._fits(probe, goal, graph):
             return None
+        self._interest *= TIRING
         at = (probe.steps[-1], probe.situation)
         self._tries[at] = self._tries.get(at, 0.0) + graph.skill(probe.steps[-1])
         return probe
 
     def _most_doubtful(self, goal: int, graph: Graph) -> Probe | None:
         """Return the probe of most doubt per trial that is met on random walks, or None where there is little doubt."""
-        best, best_value = None, 0.0
+        best, best_value = None, self._config.least_doubt
         known: dict[Situation, np.ndarray] = {}
         for steps, here in random_walks(START, graph, n_walks=N_WALKS, length=self._config.probe_trials, rng=self._rng):
             if here not in known:
                 known[here] = self._doubts(here, graph)
             doubtful = int(np.argmax(known[here]))
-            doubt = float(known[here][doubtful])
-            value = doubt / (len(steps) + 1)
+            value = float(known[here][doubtful]) / (len(steps) + 1)
             probe = Probe((*steps, doubtful), here)
-            if doubt >= self._config.least_doubt and value > best_value and self._fits(probe, goal, graph):
+            if value > best_value and self._fits(probe, goal, graph):
                 best, best_value = probe, value
         return best
 
@@ -180,6 +185,7 @@ class Curiosity:
     def state_dict(self) -> dict[str, Any]:
         """Return all memory; the generator belongs to the selector."""
         return {
+            "interest": self._interest,
             "probe": None if self._probe is None else [list(self._probe.steps), list(self._probe.situation)],
             "tries": [[goal, list(situation), n] for (goal, situation), n in self._tries.items()],
             "suspects": [[goal, list(situation)] for goal, situation in sorted(self._suspects)],
@@ -187,6 +193,7 @@ class Curiosity:
 
     def load_state_dict(self, state: dict[str, Any]) -> None:
         """Restore bit for bit."""
+        self._interest = float(state["interest"])
         probe = state["probe"]
         self._probe = None if probe is None else Probe(tuple(probe[0]), Situation(*probe[1]))
         self._tries = {(goal, Situation(*situation)): n for goal, situation, n in state["tries"]}

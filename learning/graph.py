@@ -16,6 +16,7 @@ __all__ = ["Finding", "Graph"]
 
 LEAST_SKILL = 0.05
 KNOWN = 0.5
+"""Least chance of being allowed at a plan's end for it to count as a known way."""
 BEGINNERS_LUCK = 0.15
 """Chance that an expert without one success achieves its goal in a trial where it is allowed."""
 LOSS = 0.02
@@ -53,8 +54,8 @@ class Graph:
         self._lost = np.zeros((n_goals, n_goals))
         """[j, k]: how often goal k held when goal j was achieved, and then held no longer."""
         self._changed_epoch: list[int | None] = [None] * n_goals
-        self._is_known = [False] * n_goals
-        """Goals that came about at least once."""
+        self._came_about = [False] * n_goals
+        """Goals that were achieved at least once."""
         self._log = tuple(deque[Evidence](maxlen=N_EVIDENCE) for _ in range(n_goals))
 
     # ------------------------------------------------------------------------------------------------------ learn
@@ -71,7 +72,7 @@ class Graph:
             findings.append(self._update(tried, attempt, is_achieved=True))
         elif outcome is TrialOutcome.BLOCKED or not self._config.use_blocked_only:
             findings.append(self._update(tried, attempt, is_achieved=False))
-        elif not self._is_known[tried]:
+        elif not self._came_about[tried]:
             self._doubt(tried, attempt)
         for i, (was_on, is_on) in enumerate(zip(attempt.state, attempt.state_after, strict=True)):
             if is_on and not was_on and i != tried:
@@ -80,7 +81,7 @@ class Graph:
 
     def _update(self, goal: int, attempt: Attempt, *, is_achieved: bool) -> Finding:
         belief, before = self.beliefs[goal], self.most_probable(goal)
-        self._is_known[goal] |= is_achieved
+        self._came_about[goal] |= is_achieved
         evidence = Evidence(
             epoch=attempt.epoch, is_achieved=is_achieved, readings=_readings(goal, attempt, is_achieved=is_achieved)
         )
@@ -209,7 +210,7 @@ class Graph:
             "carried": self._carried.copy(),
             "lost": self._lost.copy(),
             "changed_epoch": list(self._changed_epoch),
-            "is_known": list(self._is_known),
+            "came_about": list(self._came_about),
             "log": [[msgspec.json.decode(msgspec.json.encode(evidence)) for evidence in kept] for kept in self._log],
         }
 
@@ -221,7 +222,7 @@ class Graph:
         self._carried = np.array(state["carried"], dtype=float)
         self._lost = np.array(state["lost"], dtype=float)
         self._changed_epoch = list(state["changed_epoch"])
-        self._is_known = list(state["is_known"])
+        self._came_about = list(state["came_about"])
         for kept, loaded in zip(self._log, state["log"], strict=True):
             kept.clear()
             kept.extend(msgspec.convert(loaded, list[Evidence]))

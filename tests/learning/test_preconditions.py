@@ -1,0 +1,119 @@
+"""Beliefs about preconditions: the hypotheses, Bayes' rule by hand, readings, change."""
+
+import math
+
+import numpy as np
+import pytest
+
+from learning.preconditions import START, Belief, Evidence, Likelihood, Needs, Situation, conjunctions, mask
+
+SURE = Likelihood(p_hit=0.95, false_positive=0.02)
+
+
+def belief(n_goals=3, goal=2, max_literals=2, literal_cost=1.2):
+    return Belief(n_goals=n_goals, goal=goal, max_literals=max_literals, literal_cost=literal_cost)
+
+
+def state(*goals):
+    bits = sum(1 << g for g in goals)
+    return Situation(bits, bits)
+
+
+def seen(is_achieved, *readings):
+    return Evidence(epoch=0, is_achieved=is_achieved, readings=readings)
+
+
+@pytest.mark.parametrize(
+    ("n_goals", "max_literals", "count"), [(6, 5, 243), (6, 3, 131), (12, 3, 1563), (2, 3, 3), (1, 3, 1)]
+)
+def test_there_are_as_many_conjunctions_as_choices_of_literals(n_goals, max_literals, count):
+    found = list(conjunctions(n_goals, 0, max_literals))
+    assert len(found) == len(set(found)) == count
+    assert found[0] == Needs(0, 0)
+    assert not any((needs.on | needs.off) & 1 or needs.on & needs.off for needs in found)
+
+
+def test_the_prior_falls_by_the_cost_with_each_literal():
+    b = belief(literal_cost=1.2)
+    # One empty conjunction, 4 of one literal, 4 of two.
+    total = 1 + 4 * math.exp(-1.2) + 4 * math.exp(-2.4)
+    assert b.most_probable == Needs(0, 0)
+    assert b.confidence == pytest.approx(1 / total)
+    assert b.probabilities.sum() == pytest.approx(1.0)
+
+
+def test_bayes_rule_by_hand():
+    # Two goals: hypotheses {}, {0 on}, {0 off}. Blocked with nothing on: {} and {0 off} had predicted success.
+    b = belief(n_goals=2, goal=1, max_literals=1, literal_cost=0.0)
+    expected = b.update(seen(False, START), SURE)
+    weights = {Needs(0, 0): 0.05, Needs(1, 0): 0.98, Needs(0, 1): 0.05}
+    assert expected == pytest.approx(sum(weights.values()) / 3)
+    assert b.confidence == pytest.approx(0.98 / 1.08)
+    assert b.most_probable == Needs(on=1, off=0)
+    assert b.predict_allowed(START) == pytest.approx(0.10 / 1.08)
+    assert b.marginals()[0] == pytest.approx((0.98 / 1.08, 0.05 / 1.08))
+
+
+def test_evidence_of_half_weight_moves_half_as_far_in_odds():
+    whole, half = (belief(n_goals=2, goal=1, max_literals=1, literal_cost=0.0) for _ in range(2))
+    whole.update(seen(False, START), SURE)
+    for _ in range(2):
+        half.update(seen(False, START), SURE, weight=0.5)
+    assert half.probabilities == pytest.approx(whole.probabilities)
+
+
+def test_a_failure_in_a_situation_of_two_readings_is_averaged_and_a_success_needs_only_one():
+    ambiguous = (START, state(0))
+    failed = belief(n_goals=2, goal=1, max_literals=1, literal_cost=0.0)
+    failed.update(seen(False, *ambiguous), SURE)
+    # {} is allowed in both readings (0.05), the literals in one of them: (0.05 + 0.98) / 2.
+    assert failed.confidence == pytest.approx(0.515 / (0.05 + 2 * 0.515))
+    achieved = belief(n_goals=2, goal=1, max_literals=1, literal_cost=0.0)
+    achieved.update(seen(True, *ambiguous), SURE)
+    assert achieved.probabilities == pytest.approx([1 / 3] * 3)
+
+
+def test_what_was_dropped_does_not_hold_but_is_latched():
+    dropped = Situation(holds=0, latched=1)
+    assert not Needs(on=1, off=0).allow(dropped)
+    assert not Needs(on=0, off=1).allow(dropped)
+    assert Needs(on=0, off=0).allow(dropped)
+
+
+def test_vector_and_scalar_judgement_agree():
+    b = belief(n_goals=4, goal=0, max_literals=3)
+    every = list(conjunctions(4, 0, 3))
+    for holds in range(16):
+        for latched in range(16):
+            situation = Situation(holds, latched)
+            assert b.allows(situation).tolist() == [needs.allow(situation) for needs in every]
+
+
+def test_the_hazard_mixes_with_the_prior():
+    b = belief()
+    prior = b.probabilities.copy()
+    b.update(seen(True, state(0)), SURE)
+    sharp = b.probabilities.copy()
+    b.mix_with_prior(0.25)
+    assert b.probabilities == pytest.approx(0.75 * sharp + 0.25 * prior)
+
+
+def test_draws_follow_the_posterior():
+    b = belief(n_goals=2, goal=1, max_literals=1, literal_cost=0.0)
+    b.update(seen(False, START), SURE)
+    rng = np.random.default_rng(0)
+    share = sum(b.sample(rng) == Needs(1, 0) for _ in range(3000)) / 3000
+    assert share == pytest.approx(0.98 / 1.08, abs=0.02)
+
+
+def test_a_belief_survives_ten_thousand_contrary_surprises_without_losing_its_sum():
+    b = belief()
+    for i in range(10_000):
+        b.mix_with_prior(0.0)
+        b.update(seen(i % 2 == 0, START), SURE)
+    assert np.isfinite(b.probabilities).all()
+    assert b.probabilities.sum() == pytest.approx(1.0)
+
+
+def test_a_mask_has_bit_i_for_goal_i():
+    assert mask((True, False, True)) == 0b101
