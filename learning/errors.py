@@ -1,6 +1,6 @@
 """Errors of the learning package, in families by who must act."""
 
-__all__ = ["CheckpointError", "LearningError", "RunFolderError", "TooManyVoidEpochsError", "WorkerError"]
+__all__ = ["CheckpointError", "LearningError", "RunFolderError", "TooManyVoidEpochsError"]
 
 
 class LearningError(Exception):
@@ -13,10 +13,6 @@ class RunFolderError(LearningError, ValueError):
 
 class CheckpointError(LearningError):
     """A checkpoint is torn, of another kind, or holds what it may not hold."""
-
-
-class WorkerError(LearningError):
-    """An evaluation worker broke: the run goes on without it."""
 
 
 class TooManyVoidEpochsError(LearningError):

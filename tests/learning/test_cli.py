@@ -133,6 +133,24 @@ def test_evaluate_without_a_checkpoint_fails_in_one_line(run, tmp_path):
     assert lines(done)[-1].startswith("error: no readable checkpoint")
 
 
+def test_explain_tells_every_goals_needs_and_plan(run):
+    done = autotelic("explain", "done", "--json")
+    assert done.exit_code == 0, done.output
+    told = json.loads(done.stdout)
+    assert [entry["goal"] for entry in told["explanations"]] == list(range(len(told["goals"])))
+    table = autotelic("explain", "done")
+    assert table.exit_code == 0
+    assert "nothing" in table.stdout
+
+
+def test_explain_of_a_learner_without_a_graph_fails_in_one_line(folder):
+    (folder / "q.yaml").write_text((folder / "fast.yaml").read_text() + "subgoal_selection: {kind: q}\n")
+    assert learn("without", "--preset", "q.yaml", "--epochs", 1).exit_code == 0
+    done = autotelic("explain", "without")
+    assert done.exit_code == 1
+    assert lines(done) == ["error: without: expected a run whose sub-goal selector is graph, it is q"]
+
+
 def test_report_compares_runs_and_writes_where_it_is_told(folder, tmp_path):
     for name, seed, learner in (("a", 5, "toy"), ("b", 6, "toy"), ("c", 5, "other")):
         make_toy_folder(tmp_path / "sweep" / name, seed=seed, learner=learner)
@@ -173,7 +191,7 @@ def test_ctrl_c_stops_at_an_epochs_end_and_resuming_gives_the_uninterrupted_run(
         "1",
     ]
     command = [sys.executable, "-c", "from robot.cli import main; main()", *command[3:]]
-    long = ["--epochs", "60", "--seed", "0"]
+    long = ["--epochs", "24", "--seed", "0"]
     with subprocess.Popen(
         [*command, *long, "--out", "stopped"], cwd=folder, stderr=subprocess.PIPE, text=True
     ) as process:
@@ -187,7 +205,7 @@ def test_ctrl_c_stops_at_an_epochs_end_and_resuming_gives_the_uninterrupted_run(
     assert "stopping after this epoch" in said
     assert "go on with: autotelic learn --resume --out stopped" in said
     n_done = len(goals.read_bytes().splitlines()) - 1
-    assert 3 <= n_done < 60
+    assert 3 <= n_done < 24
     resumed = autotelic("learn", "--resume", "--out", "stopped")
     assert resumed.exit_code == 0, resumed.output
     whole = learn("unbroken", *long)
