@@ -92,4 +92,4 @@ def test_every_dependency_is_pinned():
         *(name for extra in project["optional-dependencies"].values() for name in extra),
     ]
     pinned = {pin.split("==")[0].lower().replace("_", "-") for pin in pins()}
-    assert {re.split(r"[<>=]", name)[0].lower().replace("_", "-") for name in wanted} <= pinned
+    assert {re.split(r"[\[<>=]", name)[0].lower().replace("_", "-") for name in wanted} <= pinned
