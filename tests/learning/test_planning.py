@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from learning.planning import Effort, cheapest_plan, relevant_goals
-from learning.preconditions import START, Needs, Situation
+from learning.preconditions import START, Situation
 from tests.support.abstract_table import PAPER_AFTER, PAPER_BEFORE, draw_rules, needs, optimal_trials
 
 

@@ -4,6 +4,7 @@ It runs the upper layers as the agent does and measures them by the project's wo
 """
 
 from collections.abc import Sequence
+from typing import Any
 from itertools import pairwise
 
 import msgspec
@@ -164,6 +165,20 @@ class Learner:
     def test_epoch(self, table: AbstractTable, epoch: int, goal: int) -> tuple[bool, int]:
         """Pursue a goal with learning off; return whether it was achieved, and the trials it took."""
         return self._pursue(table, epoch, goal, explore=False)
+
+    def state_dict(self) -> dict[str, Any]:
+        """Return everything learnt."""
+        return {
+            "goal_selector": self.goal_selector.state_dict(),
+            "selector": self.selector.state_dict(),
+            "outcomes": [list(results) for results in self._outcomes],
+        }
+
+    def load_state_dict(self, state: dict[str, Any]) -> None:
+        """Restore bit for bit."""
+        self.goal_selector.load_state_dict(state["goal_selector"])
+        self.selector.load_state_dict(state["selector"])
+        self._outcomes = [list(results) for results in state["outcomes"]]
 
     def _pursue(self, table: AbstractTable, epoch: int, goal: int, *, explore: bool) -> tuple[bool, int]:
         table.reset()

@@ -1,0 +1,196 @@
+"""The graph selector: what is evidence of what, and how choices follow from it."""
+
+import time
+
+import numpy as np
+import pytest
+
+from config.learning import SubgoalSelection
+from learning.graph import Graph
+from learning.interfaces import Attempt, TrialOutcome
+from learning.preconditions import START, Needs, Situation
+from learning.subgoal_graph import GraphSelector
+from tests.support.abstract_table import needs
+
+ACHIEVED, BLOCKED, NOT_REACHED = TrialOutcome.ACHIEVED, TrialOutcome.BLOCKED, TrialOutcome.NOT_REACHED
+N = 4
+
+
+def flags(*goals):
+    return tuple(i in goals for i in range(N))
+
+
+def trial(subgoal, before=(), after=None, outcome=None, *, holds=None, holds_after=None, skill=0.95, epoch=0):
+    after = (*before, subgoal) if after is None and outcome is None else before if after is None else after
+    return Attempt(
+        epoch=epoch, goal=subgoal, subgoal=subgoal, state=flags(*before), state_after=flags(*after),
+        holds=None if holds is None else flags(*holds), holds_after=None if holds_after is None else flags(*holds_after),
+        outcome=outcome or ACHIEVED, predicted=0.5, skill=skill, n_steps=10,
+    )  # fmt: skip
+
+
+def graph(**config):
+    return Graph(n_goals=N, config=SubgoalSelection(**config))
+
+
+def at(*goals):
+    bits = sum(1 << g for g in goals)
+    return Situation(bits, bits)
+
+
+def test_blocked_without_and_achieved_with_another_goal_makes_it_a_need():
+    g = graph()
+    g.learn(trial(3, outcome=BLOCKED))
+    g.learn(trial(3, (1,)))
+    g.learn(trial(3, (2,), outcome=BLOCKED))
+    assert g.most_probable(3) == needs([1])
+    assert g.plan(3) == (1, 3)
+
+
+def test_a_negative_need_is_found_and_kept_from():
+    g = graph()
+    g.learn(trial(3))
+    g.learn(trial(3, (1,), outcome=BLOCKED))
+    g.learn(trial(3, (2,), outcome=ACHIEVED, after=(2, 3)))
+    assert g.most_probable(3) == needs(off=[1])
+    assert g.predict_allowed(at(1))[3] < 0.2
+    assert g.plan(3, at(1)) is None
+
+
+def test_two_goals_together_may_be_needed():
+    g = graph()
+    for before in ((), (0,), (1,), (2,)):
+        g.learn(trial(3, before, outcome=BLOCKED, epoch=len(before)))
+    g.learn(trial(3, (0, 1)))
+    g.learn(trial(3, (0, 2), outcome=BLOCKED))
+    assert g.most_probable(3) == needs([0, 1])
+
+
+def test_a_trial_that_did_not_reach_the_place_is_no_evidence_once_the_goal_was_ever_achieved():
+    g = graph()
+    g.learn(trial(3))
+    before = g.beliefs[3].probabilities.copy()
+    g.learn(trial(3, outcome=NOT_REACHED))
+    assert g.beliefs[3].probabilities.tolist() == before.tolist()
+    counting = graph(use_blocked_only=False)
+    counting.learn(trial(3))
+    before = counting.predict_allowed(START)[3]
+    counting.learn(trial(3, outcome=NOT_REACHED))
+    assert counting.predict_allowed(START)[3] < before
+
+
+def test_an_unskilled_experts_blocked_trial_says_less_than_a_skilled_ones():
+    novice, master = graph(), graph()
+    novice.learn(trial(3, outcome=BLOCKED, skill=0.1))
+    master.learn(trial(3, outcome=BLOCKED, skill=0.95))
+    assert master.predict_allowed(START)[3] < novice.predict_allowed(START)[3] < graph().predict_allowed(START)[3]
+
+
+def test_one_wrongly_blocked_trial_does_not_overturn_what_is_well_known():
+    g = graph(hazard=0.002)
+    for _ in range(10):
+        g.learn(trial(0))
+    g.learn(trial(0, outcome=BLOCKED))
+    assert g.most_probable(0) == needs()
+    assert g.predict_allowed(START)[0] > 0.9
+
+
+def test_a_real_change_overturns_it_within_five_trials():
+    g = graph(hazard=0.002)
+    for _ in range(50):
+        g.learn(trial(3, (1,)))
+        g.learn(trial(3, outcome=BLOCKED))
+    assert g.most_probable(3) == needs([1])
+    for epoch in range(1, 6):
+        g.learn(trial(3, (1,), outcome=BLOCKED, epoch=epoch))
+    assert g.predict_allowed(at(1))[3] < 0.5
+
+
+def test_what_comes_about_by_accident_is_evidence_for_it_in_the_state_before():
+    g = graph()
+    for _ in range(3):
+        g.learn(trial(0, outcome=NOT_REACHED, after=(3,)))
+    assert g.predict_allowed(START)[3] > 0.9
+
+
+def test_where_a_need_and_what_needs_it_come_about_in_one_trial_their_order_is_left_open():
+    g = graph()
+    before = g.beliefs[3].marginals()[1][0]
+    g.learn(trial(3, after=(1, 3)))
+    # Success may have come before goal 1 or after it: "1 on" loses nothing by it.
+    assert g.beliefs[3].marginals()[1][0] >= before * 0.95
+
+
+def test_a_failure_after_a_drop_does_not_refute_the_need_for_what_was_dropped():
+    told, untold = graph(), graph()
+    for g in (told, untold):
+        for _ in range(3):
+            g.learn(trial(3, outcome=BLOCKED))
+            g.learn(trial(3, (1,)))
+    assert told.most_probable(3) == needs([1])
+    for epoch in range(1, 6):
+        told.learn(trial(3, (1,), outcome=BLOCKED, holds=(), holds_after=(), epoch=epoch))
+        untold.learn(trial(3, (1,), outcome=BLOCKED, epoch=epoch))
+    assert told.most_probable(3) == needs([1])
+    assert untold.most_probable(3) != needs([1])
+
+
+def test_a_dropped_thing_is_fetched_again_before_what_needs_it():
+    selector = GraphSelector(n_goals=N, config=SubgoalSelection(), rng=np.random.default_rng(0))
+    for _ in range(3):
+        selector.update(trial(3, outcome=BLOCKED))
+        selector.update(trial(3, (1,)))
+    choose = {"goal": 3, "state": flags(1), "temperature": 0.1, "explore": False}
+    assert selector.select(available=(True, False, True, True), **choose) == 3
+    assert selector.select(available=(True, True, True, True), **choose) == 1
+
+
+def test_one_hand_learns_that_taking_one_thing_lets_go_of_another():
+    g = graph()
+    for _ in range(4):
+        g.learn(trial(1, (0,), holds=(0,), holds_after=(1,)))
+    assert g.undone(1) == 0b1
+    assert g.follow((0, 1)) == Situation(holds=0b10, latched=0b11)
+
+
+def test_revisions_are_told_with_all_that_depends_on_them():
+    selector = GraphSelector(n_goals=N, config=SubgoalSelection(), rng=np.random.default_rng(0))
+    for _ in range(3):
+        selector.update(trial(3, outcome=BLOCKED))
+        selector.update(trial(3, (1,)))
+    selector.update(trial(1, outcome=BLOCKED))
+    assert selector.changed_goals() == (1, 3)
+    selector.update(trial(0))
+    assert selector.changed_goals() == ()
+
+
+def test_the_epoch_of_the_last_revision_is_remembered():
+    g = graph()
+    assert g.changed_epoch(3) is None
+    g.learn(trial(3, outcome=BLOCKED, epoch=7))
+    g.learn(trial(3, (1,), epoch=9))
+    g.learn(trial(3, (1,), epoch=30))
+    assert 7 <= g.changed_epoch(3) <= 9
+
+
+def test_a_graph_of_one_goal_works():
+    selector = GraphSelector(n_goals=1, config=SubgoalSelection(curiosity=1.0), rng=np.random.default_rng(0))
+    for explore in (True, False):
+        assert selector.select(goal=0, state=(False,), available=(True,), temperature=0.1, explore=explore) == 0
+
+
+@pytest.mark.parametrize(("n_goals", "limit_ms"), [(6, 1.0), (12, 5.0)])
+def test_a_choice_takes_little_time(n_goals, limit_ms):
+    selector = GraphSelector(n_goals=n_goals, config=SubgoalSelection(), rng=np.random.default_rng(0))
+    spent = []
+    for _ in range(60):
+        begin = time.perf_counter()
+        selector.select(
+            goal=n_goals - 1, state=(False,) * n_goals, available=(True,) * n_goals, temperature=0.1, explore=False
+        )
+        spent.append(time.perf_counter() - begin)
+    assert float(np.median(spent)) * 1e3 < limit_ms
+
+
+def test_needs_are_plain_pairs_of_bit_masks():
+    assert needs([0], [2]) == Needs(on=0b001, off=0b100)
