@@ -11,6 +11,7 @@ import numpy as np
 
 from config.learning import LearningConfig
 from learning.actions import Candidates, heading_of
+from learning.boredom import Boredom
 from learning.forward_model import make_forward_model
 from learning.interfaces import GoalState, TrialOutcome
 from learning.networks import normalised
@@ -54,6 +55,7 @@ class ExpertSet:
             config.novelty, spec, forward=self._forward, memory=self._memory, scales_m=self._scales_m, rng=self._rng
         )
         self._candidates = Candidates(spec, config.actions)
+        self._boredom = Boredom(n_inputs, height=config.expert.boredom, sigma=config.expert.boredom_sigma)
         self._begin(0, explore=False, is_by_model=True)
 
     def _begin(self, subgoal: int, *, explore: bool, is_by_model: bool) -> None:
@@ -62,9 +64,7 @@ class ExpertSet:
         self._trace: list[Array] = []
         """Normalised P's that the moves of this trial were to lead to."""
         self._distances_m: list[Array] = []
-        self._seen: list[Array] = []
-        self._dwelt: list[float] = []
-        """How much each of the places seen bores: more, the longer nothing has moved."""
+        self._boredom.begin()
         self._dead_ends: list[Array] = []
         self._came_about: list[tuple[int, Array, Array]] = []
         """Goals that came about, each with its trace and the distances at its end."""
@@ -107,22 +107,10 @@ class ExpertSet:
         model = self._models[self._subgoal]
         asked = self._candidates.asked(self._rng.random() if self._is_exploring else 0.0)
         x = normalised(self._forward.predict(asked), states, self._scales_m)
-        utility = model.rate(x) - self._boredom(x * model.weights)
-        best = int(np.argmax(utility))
-        self._seen.append(x[best] * model.weights)
-        self._dwelt.append(1.0 + self._n_still)
+        weighted = x * model.weights
+        best = int(np.argmax(model.rate_weighted(weighted) - self._boredom.of(weighted)))
+        self._boredom.add(weighted[best], n_still=self._n_still)
         return asked[best], x[best]
-
-    def _boredom(self, x: Array) -> Array:
-        """Return what is taken off places like those just asked for: no ripple of a model holds the arm for good.
-
-        boredom * sum over the trial's steps of dwelt * exp(-|x - seen|^2 / (2 sigma^2)).  (k, n_inputs) -> (k,)
-        """
-        if not self._seen or not self._config.boredom:
-            return np.zeros(len(x), dtype=np.float32)
-        seen = np.array(self._seen)
-        apart = (x * x).sum(axis=1)[:, None] - 2.0 * x @ seen.T + (seen * seen).sum(axis=1)
-        return self._config.boredom * (np.exp(apart * (-0.5 / self._config.boredom_sigma**2)) @ np.array(self._dwelt))
 
     def _note_stillness(self, percept: Percept) -> None:
         """Count the steps in which nothing moved; a hand at work is no stillness."""

@@ -71,7 +71,11 @@ class UtilityModel:
 
     def rate(self, x: Array) -> Array:
         """Return the expected utility of each normalised P.  (k, n_inputs) float32 -> (k,)"""
-        return self._network.rate(x * self.weights)[:, 0]
+        return self.rate_weighted(x * self.weights)
+
+    def rate_weighted(self, x: Array) -> Array:
+        """Return the same for inputs that were weighted by relevance already."""
+        return self._network.rate(x)[:, 0]
 
     def chance(self, x: Array) -> float:
         """Return the expected probability of success from a normalised P, in [0, 1].  (n_inputs,) -> ()
