@@ -36,17 +36,20 @@ class QSelector:
         """Goal-state -> Q of each goal and sub-goal, (n, n)."""
         self._known: set[tuple[int, int]] = set()
         """Goal-states and sub-goals that were achieved from them."""
+        self._order = rng.permutation(n_goals)
+        """Which comes first among equals: by index, a table listed in the order of its needs would solve itself."""
 
     # ----------------------------------------------------------------------------------------------------- decide
 
     def select(
         self, *, goal: int, state: GoalState, available: tuple[bool, ...], temperature: float, explore: bool
     ) -> int:
-        """Return a sub-goal by softmax over the available ones' Q; without explore the best, first among equals."""
+        """Return a sub-goal by softmax over the available ones' Q; without explore the best one."""
         q = self.q_values(goal, state)
         if explore:
             return draw(softmax(q, temperature, available), self._rng)
-        return int(np.argmax(softmax(q, 1.0, available)))
+        p = softmax(q, 1.0, available)
+        return int(self._order[np.argmax(p[self._order])])
 
     def q_values(self, goal: int, state: GoalState) -> np.ndarray:
         """Return the Q of each sub-goal in a goal-state while pursuing a goal.  () -> (n,)"""
@@ -104,6 +107,7 @@ class QSelector:
             "states": np.array(list(self._q), dtype=np.int64),
             "q": np.array(list(self._q.values())).reshape(-1, self._n, self._n),
             "known": np.array(sorted(self._known), dtype=np.int64).reshape(-1, 2),
+            "order": self._order.copy(),
             "rng": self._rng.bit_generator.state,
         }
 
@@ -111,6 +115,7 @@ class QSelector:
         """Restore bit for bit."""
         self._q = {int(s): np.array(row) for s, row in zip(state["states"], state["q"], strict=True)}
         self._known = {(int(s), int(a)) for s, a in state["known"]}
+        self._order = np.array(state["order"], dtype=np.int64)
         self._rng.bit_generator.state = state["rng"]
 
 

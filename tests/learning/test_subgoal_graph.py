@@ -24,7 +24,8 @@ def trial(subgoal, before=(), after=None, outcome=None, *, holds=None, holds_aft
     after = (*before, subgoal) if after is None and outcome is None else before if after is None else after
     return Attempt(
         epoch=epoch, goal=subgoal, subgoal=subgoal, state=flags(*before), state_after=flags(*after),
-        holds=None if holds is None else flags(*holds), holds_after=None if holds_after is None else flags(*holds_after),
+        holds=None if holds is None else flags(*holds),
+        holds_after=None if holds_after is None else flags(*holds_after),
         outcome=outcome or ACHIEVED, predicted=0.5, skill=skill, n_steps=10,
     )  # fmt: skip
 

@@ -161,3 +161,11 @@ def test_saved_loaded_and_continued_is_as_if_never_stopped(kind):
     ]
     assert choices[0] == choices[1]
     assert encode(whole.state_dict()) == encode(resumed.state_dict())
+
+
+def test_an_untaught_table_does_not_go_by_the_order_of_the_goals():
+    firsts = {
+        selector(seed=seed).select(goal=2, state=state(), available=ALL, temperature=0.1, explore=False)
+        for seed in range(20)
+    }
+    assert firsts == {0, 1, 2}

@@ -4,8 +4,8 @@ It runs the upper layers as the agent does and measures them by the project's wo
 """
 
 from collections.abc import Sequence
-from typing import Any
 from itertools import pairwise
+from typing import Any
 
 import msgspec
 import numpy as np
