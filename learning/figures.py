@@ -44,8 +44,8 @@ ALIKE = 0.35
 """RGB distance below which two goals' colours are told apart by lightness."""
 WIDTHS = (2.8, 1.2)
 """Line widths of the first and the last goal: where lines coincide, the wider ones show under the narrower."""
-SHARE_WINDOW = 50
-"""Epochs over which the share of goal choices is taken."""
+SHARE_WINDOWS = 40
+"""Parts of a run that shares of goal choices are taken over, each of whole tens of epochs."""
 
 
 class Style:
@@ -194,7 +194,7 @@ def curriculum_figure(groups: Sequence[Group]) -> Figure:
             if len(groups) > 1:
                 axes[0, column].set_title(f"{group.name}, seed {group.runs[0].manifest.seed}", loc="left")
             axes[0, column].set_xlabel("goal of each epoch: coloured achieved, grey missed", color=GREY, fontsize=7.5)
-        axes[1, 0].set_ylabel(f"share of choices\n(over {SHARE_WINDOW} epochs)")
+        axes[1, 0].set_ylabel("share of choices")
     return figure
 
 
@@ -216,24 +216,29 @@ def _draw_choices(axes: Axes, group: Group) -> None:
 
 def _draw_shares(axes: Axes, group: Group) -> None:
     n_epochs = max(len(run.goal_rows) for run in group.runs)
-    drawn = styles(group.runs[0].manifest.goals)
     if n_epochs:
-        starts = np.arange(0, n_epochs, SHARE_WINDOW)
-        shares = np.zeros((len(drawn), len(starts)))
-        for run in group.runs:
-            for row in run.goal_rows:
-                shares[row.goal, row.epoch // SHARE_WINDOW] += 1.0
-        shares /= shares.sum(axis=0)
-        edges = np.append(starts, n_epochs)
-        base = np.zeros(len(starts))
-        for share, style in zip(shares[::-1], reversed(drawn), strict=True):
-            axes.stairs(base + share, edges, baseline=base, fill=True, color=style.colour, alpha=0.8, label=style.label)
-            axes.stairs(base + share, edges, baseline=None, color="white", linewidth=0.7)
-            base = base + share
+        _stack_shares(axes, group, n_epochs)
     axes.set_ylim(0, 1)
     axes.yaxis.set_major_formatter(PercentFormatter(1.0))
-    axes.set_xlabel("epochs")
     _mark_changes(axes, group, label=False, zorder=3.0)
+
+
+def _stack_shares(axes: Axes, group: Group, n_epochs: int) -> None:
+    drawn = styles(group.runs[0].manifest.goals)
+    window = max(10, 10 * round(n_epochs / SHARE_WINDOWS / 10))
+    starts = np.arange(0, n_epochs, window)
+    shares = np.zeros((len(drawn), len(starts)))
+    for run in group.runs:
+        for row in run.goal_rows:
+            shares[row.goal, row.epoch // window] += 1.0
+    shares /= shares.sum(axis=0)
+    edges = np.append(starts, n_epochs)
+    base = np.zeros(len(starts))
+    for share, style in zip(shares[::-1], reversed(drawn), strict=True):
+        axes.stairs(base + share, edges, baseline=base, fill=True, color=style.colour, alpha=0.8, label=style.label)
+        axes.stairs(base + share, edges, baseline=None, color="white", linewidth=0.7)
+        base = base + share
+    axes.set_xlabel(f"epochs (shares over {window})")
 
 
 def _shaded(colour: tuple[float, float, float], n_alike: int) -> tuple[float, float, float]:
