@@ -120,6 +120,8 @@ class Novelty(Section, frozen=True, kw_only=True):
 
     memory: Count = 200
     temperature: Positive = 0.05
+    near_only: bool = False
+    """Only how near things are can be new; all that is far looks alike. For a model that does not know the fences."""
     wishes: Count = 512
     """Places compared when a new wish is made."""
     reach_m: Span = 0.5
@@ -132,9 +134,15 @@ class ForwardModel(Section, frozen=True, kw_only=True):
     """Who predicts P(t+1) of a candidate move."""
 
     kind: OneOf["geometric", "learned"] = "geometric"
-    hidden: Annotated[tuple[Count, ...], Meta(min_length=1, max_length=4)] = (128, 128)
-    history: Annotated[int, Meta(ge=1, le=20)] = 4
+    hidden: Annotated[tuple[Count, ...], Meta(min_length=1, max_length=4)] = (64, 64)
+    history: Annotated[int, Meta(ge=1, le=64)] = 20
+    """Time steps that bearings are told from."""
     learning_rate: Positive = 1e-3
+    batch: Count = 64
+    updates_per_trial: Annotated[int, Meta(ge=0, le=10_000)] = 30
+    rate_half: Positive = 200.0
+    """Trials after which it is trained half as much as at first."""
+    buffer_steps: Count = 8_000
 
 
 class Actions(Section, frozen=True, kw_only=True):

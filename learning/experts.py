@@ -50,7 +50,8 @@ class ExpertSet:
         self._rng = streams[0]
         self._forward = make_forward_model(config.forward_model, spec, streams[1])
         n_inputs = len(self._models[0].weights)
-        self._memory = NoveltyMemory(config.novelty.memory, n_inputs)
+        skip = spec.n_distances if config.novelty.near_only else 0
+        self._memory = NoveltyMemory(config.novelty.memory, n_inputs, skip=skip)
         self._curiosity = Curiosity(
             config.novelty, spec, forward=self._forward, memory=self._memory, scales_m=self._scales_m, rng=self._rng
         )

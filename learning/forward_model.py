@@ -1,16 +1,20 @@
 """Forward models: what would P(t+1) be after a move. This page holds the door and the given, geometric one."""
 
+from importlib import import_module
 from typing import Any, Protocol
 
 import numpy as np
 
 from config.learning import ForwardModel as ForwardModelConfig
-from learning.errors import LearningError
 from robot.messages import Heading, Percept, StationSpec, StepResult, Vec3
 
 __all__ = ["TABLE", "ForwardModel", "GeometricModel", "make_forward_model", "shaped"]
 
 Array = np.ndarray
+MODELS = {
+    "geometric": "learning.forward_model:GeometricModel",
+    "learned": "learning.learned_forward:LearnedModel",
+}
 TABLE = "table"
 CARRIED_WITHIN_M = 0.05
 """A hand that reports an object carries the nearest one, if it is this near the tool centre point."""
@@ -73,7 +77,8 @@ def shaped(asked: Array, height_m: float, max_step_m: float) -> Array:
 class GeometricModel:
     """Given knowledge: where things are (from the percept) and where the arm will come to rest (its target)."""
 
-    def __init__(self, spec: StationSpec) -> None:
+    def __init__(self, config: ForwardModelConfig, spec: StationSpec, rng: np.random.Generator) -> None:
+        del config, rng  # nothing to set, nothing to draw
         self._spec = spec
         low, high = np.array(spec.workspace_m)
         self._low, self._high = low, high
@@ -163,12 +168,6 @@ def _carried(percept: Percept, is_table: Array) -> int | None:
 
 
 def make_forward_model(config: ForwardModelConfig, spec: StationSpec, rng: np.random.Generator) -> ForwardModel:
-    """Return the configured forward model.
-
-    Raises:
-        LearningError: it is not written yet.
-    """
-    del rng  # for the learned model's weights
-    if config.kind != "geometric":
-        raise LearningError(f"forward_model.kind: expected geometric, came {config.kind}: it is not written yet")
-    return GeometricModel(spec)
+    """Return the configured forward model; the generator is for the learned one's weights and batches."""
+    module, name = MODELS[config.kind].split(":")
+    return getattr(import_module(module), name)(config, spec, rng)

@@ -7,7 +7,7 @@ import numpy as np
 import torch
 from torch import nn
 
-__all__ = ["Array", "Network", "normalised", "width"]
+__all__ = ["Array", "Network", "descend_together", "normalised", "width"]
 
 Array = np.ndarray
 
@@ -50,7 +50,9 @@ class Network:
     numpy's view and torch's parameters share their memory, so what is rated is bit for bit what was trained.
     """
 
-    def __init__(self, sizes: tuple[int, ...], *, learning_rate: float, rng: np.random.Generator) -> None:
+    def __init__(
+        self, sizes: tuple[int, ...], *, learning_rate: float, rng: np.random.Generator, output_scale: float = 1.0
+    ) -> None:
         layers: list[nn.Module] = []
         for i, (n_in, n_out) in enumerate(pairwise(sizes)):
             layers += ([nn.ReLU()] if i else []) + [nn.Linear(n_in, n_out)]
@@ -60,6 +62,7 @@ class Network:
         for view in self._views:
             bound = np.sqrt(6.0 / view.shape[1]) if view.ndim == 2 else 0.0
             view[...] = rng.uniform(-bound, bound, view.shape)
+        self._views[-2] *= output_scale
         self.optimiser = torch.optim.Adam(self._parameters, lr=learning_rate, betas=(0.9, 0.99), eps=1e-5, fused=True)
 
     @property
@@ -83,10 +86,7 @@ class Network:
 
     def descend(self, loss: torch.Tensor) -> float:
         """Take one step of Adam down a loss and return the loss."""
-        self.optimiser.zero_grad()
-        loss.backward()
-        self.optimiser.step()
-        return float(loss.detach())
+        return descend_together(loss, self)
 
     def state_dict(self) -> dict[str, Any]:
         """Return weights and Adam's moments, in the order of the layers."""
@@ -104,3 +104,13 @@ class Network:
         for parameter, moments in zip(self._parameters, state["moments"], strict=True):
             if moments:
                 self.optimiser.state[parameter] = {k: torch.from_numpy(np.array(v)) for k, v in moments.items()}
+
+
+def descend_together(loss: torch.Tensor, *networks: Network) -> float:
+    """Take one step of Adam down a loss in several networks at once and return the loss."""
+    for network in networks:
+        network.optimiser.zero_grad()
+    loss.backward()
+    for network in networks:
+        network.optimiser.step()
+    return float(loss.detach())

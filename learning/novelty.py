@@ -21,9 +21,11 @@ Array = np.ndarray
 
 
 class NoveltyMemory:
-    """The newest normalised P's; novelty is the distance to the nearest of them."""
+    """The newest normalised P's; novelty is the distance to the nearest of them, the first `skip` entries left out."""
 
-    def __init__(self, capacity: int, n_inputs: int) -> None:
+    def __init__(self, capacity: int, n_inputs: int, *, skip: int = 0) -> None:
+        self._skip = skip
+        n_inputs -= skip
         self._rows = np.zeros((capacity, n_inputs), dtype=np.float32)
         self._squares = np.zeros(capacity, dtype=np.float32)
         self._n = 0
@@ -31,6 +33,7 @@ class NoveltyMemory:
 
     def add(self, x: Array) -> None:
         """Remember a P, forgetting the oldest when full.  (n_inputs,)"""
+        x = x[self._skip :]
         self._rows[self._next] = x
         self._squares[self._next] = float(x @ x)
         self._next = (self._next + 1) % len(self._rows)
@@ -40,6 +43,7 @@ class NoveltyMemory:
         """Return how far each P is from the nearest one remembered; at first all is equally new.  (k, n) -> (k,)"""
         if self._n == 0:
             return np.ones(len(x), dtype=np.float32)
+        x = x[:, self._skip :]
         rows, squares = self._rows[: self._n], self._squares[: self._n]
         nearest = (squares - 2.0 * (x @ rows.T)).min(axis=1) + np.einsum("ij,ij->i", x, x)
         return np.sqrt(np.maximum(nearest, 0.0))

@@ -3,6 +3,7 @@ import math
 import numpy as np
 import pytest
 
+from config.learning import ForwardModel
 from config.loader import load_scenario
 from learning.forward_model import GeometricModel, shaped
 from robot.messages import Heading
@@ -23,7 +24,7 @@ def test_one_step_goes_straight_towards_what_is_asked_by_hand():
 
 def test_the_prediction_is_where_the_arm_comes_to_rest(table):
     percept = table.reset(seed=4, epoch=0)
-    model = GeometricModel(table.spec)
+    model = GeometricModel(ForwardModel(), table.spec, np.random.default_rng(0))
     model.begin(percept)
     intent = Heading(heading_rad=1.0, distance_m=0.02, height_m=0.225)
     predicted = model.predict(np.array([[0.02 * math.cos(1.0), 0.02 * math.sin(1.0), 0.225]]))[0]
@@ -35,7 +36,7 @@ def test_the_prediction_is_where_the_arm_comes_to_rest(table):
 
 def test_a_far_prediction_is_the_distance_from_there(table):
     percept = table.reset(seed=4, epoch=0)
-    model = GeometricModel(table.spec)
+    model = GeometricModel(ForwardModel(), table.spec, np.random.default_rng(0))
     model.begin(percept)
     place = {thing.name: thing.position_m for thing in percept.objects}["green_button"]
     way = np.array([[place[0] - percept.tcp_position_m[0], place[1] - percept.tcp_position_m[1], place[2]]])
@@ -48,7 +49,7 @@ def test_what_the_hand_holds_is_predicted_to_come_along(table):
     table.reset(seed=4, epoch=0)
     table.hold("blue_cylinder")
     percept = table.step(Heading(heading_rad=0.0, distance_m=0.0, height_m=0.225)).percept
-    model = GeometricModel(table.spec)
+    model = GeometricModel(ForwardModel(), table.spec, np.random.default_rng(0))
     model.begin(percept)
     i = table.spec.distance_names.index("blue_cylinder")
     predicted = model.predict(np.array([[0.1, 0.0, 0.1]]), is_far=True)[0]
@@ -57,7 +58,7 @@ def test_what_the_hand_holds_is_predicted_to_come_along(table):
 
 def test_a_step_that_was_cut_short_is_expected_to_be_so_again(table):
     percept = table.reset(seed=4, epoch=0)
-    model = GeometricModel(table.spec)
+    model = GeometricModel(ForwardModel(), table.spec, np.random.default_rng(0))
     model.begin(percept)
     down = Heading(heading_rad=0.0, distance_m=0.0, height_m=0.025)
     for _ in range(8):

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from config.learning import Novelty
+from config.learning import ForwardModel, Novelty
 from config.loader import load_scenario
 from learning.forward_model import GeometricModel
 from learning.networks import width
@@ -51,7 +51,7 @@ def explore(seed: int, n_steps: int) -> list[tuple[bool, ...]]:
     """Let curiosity alone move the arm over one table with open lids; return the goals held after each step."""
     table = KinematicTable(load_scenario("paper"))
     rng = np.random.default_rng(seed)
-    forward = GeometricModel(table.spec)
+    forward = GeometricModel(ForwardModel(), table.spec, np.random.default_rng(0))
     memory = NoveltyMemory(200, width(table.spec.n_distances, table.spec.n_buttons, SCALES_M))
     curiosity = Curiosity(Novelty(), table.spec, forward=forward, memory=memory, scales_m=SCALES_M, rng=rng)
     percept = table.reset(seed=seed, epoch=0)
