@@ -103,6 +103,7 @@ def load_run(folder: RunFolder) -> Run:
     summary = summarise(
         goal_rows,
         evaluation_rows,
+        folder.graphs(),
         n_goals=len(manifest.goals),
         changes=manifest.changes,
         optima=manifest.optima,

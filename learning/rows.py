@@ -1,4 +1,4 @@
-"""The rows of a run's metrics, as other tools read them: one a trial, one a goal choice, one an evaluation and goal."""
+"""The rows of a run's metrics, as other tools read them: trials, goal choices, evaluations by goal, looks at the graph."""
 
 import csv
 from collections.abc import Iterable
@@ -11,7 +11,18 @@ from learning.agent import EpochRecord
 from learning.errors import RunFolderError
 from learning.interfaces import GoalState, TrialOutcome
 
-__all__ = ["EvaluationRow", "GoalRow", "Row", "TrialRow", "cells", "goal_row", "header", "read_rows", "trial_rows"]
+__all__ = [
+    "EvaluationRow",
+    "GoalRow",
+    "GraphRow",
+    "Row",
+    "TrialRow",
+    "cells",
+    "goal_row",
+    "header",
+    "read_rows",
+    "trial_rows",
+]
 
 
 class Row(msgspec.Struct, frozen=True, kw_only=True):
@@ -77,6 +88,17 @@ class EvaluationRow(Row, frozen=True, kw_only=True):
     def trials_needed(self) -> float | None:
         """Mean trials over all tests, failures counting as all trials."""
         return self.trials_all / self.n_tests if self.n_tests else None
+
+
+class GraphRow(Row, frozen=True, kw_only=True):
+    """One look at the learnt graph: what it predicts against what the rules say."""
+
+    epoch: int
+    """Epochs learnt so far."""
+    rules_epoch: int
+    n_cases: int
+    """Goals times goal-states that can be reached."""
+    n_wrong: int
 
 
 R = TypeVar("R", bound=Row)

@@ -11,7 +11,7 @@ from config.loader import load_resolved
 from config.resolved import Resolved
 from learning.checkpoint import CheckpointStore, write_atomically
 from learning.errors import RunFolderError
-from learning.rows import EvaluationRow, GoalRow, TrialRow, read_rows
+from learning.rows import EvaluationRow, GoalRow, GraphRow, TrialRow, read_rows
 
 __all__ = ["FORMAT", "GoalInfo", "Manifest", "RunFolder", "run_folders"]
 
@@ -107,6 +107,10 @@ class RunFolder:
     def goals(self) -> list[GoalRow]:
         """Return one row a goal choice."""
         return read_rows(self.path / "goals.csv", GoalRow)
+
+    def graphs(self) -> list[GraphRow]:
+        """Return one row a look at the learnt graph."""
+        return read_rows(self.path / "graphs.csv", GraphRow)
 
     def evaluations(self) -> list[EvaluationRow]:
         """Return one row an evaluation and goal."""

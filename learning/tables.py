@@ -7,11 +7,16 @@ from types import TracebackType
 from typing import Self
 
 from learning.errors import RunFolderError
-from learning.rows import EvaluationRow, GoalRow, Row, TrialRow, cells, header
+from learning.rows import EvaluationRow, GoalRow, GraphRow, Row, TrialRow, cells, header
 
 __all__ = ["TABLES", "Tables"]
 
-TABLES: dict[str, type[Row]] = {"trials": TrialRow, "goals": GoalRow, "evaluations": EvaluationRow}
+TABLES: dict[str, type[Row]] = {
+    "trials": TrialRow,
+    "goals": GoalRow,
+    "graphs": GraphRow,
+    "evaluations": EvaluationRow,
+}
 """Every table of a run by its name; the file is <name>.csv."""
 
 
