@@ -17,8 +17,8 @@ from learning.errors import TooManyVoidEpochsError
 from learning.evaluation import GoalTest, learnt_graph
 from learning.evaluation_pool import EvaluationPool
 from learning.interfaces import GoalState
-from learning.metrics import Allowed, due_evaluations, graph_errors, reachable_states
-from learning.rows import EvaluationRow, goal_row, trial_rows
+from learning.metrics import Allowed, due_evaluations, due_graph_looks, graph_errors, reachable_states
+from learning.rows import EvaluationRow, GraphRow, goal_row, trial_rows
 from learning.seeds import reset_seed
 from learning.stopwatch import Stopwatch
 from learning.tables import TABLES, Tables
@@ -116,6 +116,7 @@ class Experiment:
             self._checkpoint()
         while self._n_done < self._plan.protocol.epochs and not should_stop():
             self._run_epoch()
+            self._look_at_graph_if_due()
             self._evaluate_if_due()
             is_last = self._n_done == self._plan.protocol.epochs
             if self._n_done % self._plan.protocol.checkpoint_every == 0 and not is_last:
@@ -177,6 +178,20 @@ class Experiment:
             n_tests=self._plan.protocol.test_epochs,
             n_trials=self._plan.protocol.trials,
         )
+
+    def _look_at_graph_if_due(self) -> None:
+        protocol = self._plan.protocol
+        due = due_graph_looks(
+            self._n_done, every=protocol.dense_every, changes=self._plan.changes, n_epochs=protocol.epochs
+        )
+        for rules_epoch in due:
+            compared = self._compare_graph(rules_epoch)
+            if compared is None:
+                return
+            n_cases, n_wrong = (sum(column) for column in zip(*compared, strict=True))
+            row = GraphRow(epoch=self._n_done, rules_epoch=rules_epoch, n_cases=n_cases, n_wrong=n_wrong)
+            self._tables.append("graphs", [row])
+        self._stopwatch.lap("records")
 
     def _compare_graph(self, rules_epoch: int) -> tuple[tuple[int, int], ...] | None:
         """Compare what the agent believes possible with the rules, in every goal-state that can be reached."""

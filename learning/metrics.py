@@ -7,17 +7,17 @@ from statistics import fmean
 import msgspec
 
 from learning.interfaces import GoalState
-from learning.rows import EvaluationRow, GoalRow
+from learning.rows import EvaluationRow, GoalRow, GraphRow
 
 __all__ = [
     "Era",
     "EraSummary",
     "Summary",
     "due_evaluations",
+    "due_graph_looks",
     "eras",
     "first_running",
     "graph_errors",
-    "is_graph_right",
     "is_mastered",
     "optimal_trials",
     "reachable_states",
@@ -79,6 +79,10 @@ class Era(msgspec.Struct, frozen=True, kw_only=True):
     from_epoch: int
     until_epoch: int
 
+    def holds(self, epoch: int) -> bool:
+        """Whether an epoch lies in it."""
+        return self.from_epoch <= epoch < self.until_epoch
+
 
 def eras(changes: Sequence[int], n_epochs: int) -> list[Era]:
     """Return the eras of a run of n_epochs in which the rules change at the given epochs."""
@@ -103,14 +107,16 @@ def due_evaluations(
     return [n_done - 1] if is_due else []
 
 
+def due_graph_looks(n_done: int, *, every: int, changes: Sequence[int], n_epochs: int) -> list[int]:
+    """Return under which epochs' rules to look at the learnt graph after n_done epochs; at a change under both."""
+    if n_done in changes and 0 < n_done < n_epochs:
+        return [n_done - 1, n_done]
+    return [n_done - 1] if n_done > 0 and (n_done % every == 0 or n_done == n_epochs) else []
+
+
 def is_mastered(row: EvaluationRow) -> bool:
     """Whether at least 18 of 20 test epochs succeeded."""
     return row.n_tests > 0 and row.n_successes >= MASTERED_SHARE * row.n_tests
-
-
-def is_graph_right(rows: Sequence[EvaluationRow]) -> bool:
-    """Whether the learnt graph predicted what the rules say, for every goal in every state."""
-    return bool(rows) and all(row.graph_wrong == 0 for row in rows)
 
 
 def first_running(marks: Sequence[tuple[int, bool]], *, running: int) -> int | None:
@@ -134,7 +140,7 @@ class EraSummary(msgspec.Struct, frozen=True, kw_only=True):
     learnt_after: int | None
     """First of two evaluations running at which every goal is mastered: learnt, or recovered."""
     graph_right_after: int | None
-    """First evaluation at which the learnt graph is right."""
+    """First look, every ten epochs, at which the learnt graph is right for every goal in every reachable state."""
     success_by_goal: tuple[float | None, ...]
     """Share of successes over the era's last 200 epochs' evaluations."""
     trials_by_goal: tuple[float | None, ...]
@@ -164,6 +170,7 @@ class Summary(msgspec.Struct, frozen=True, kw_only=True):
 def summarise(
     goal_rows: Sequence[GoalRow],
     evaluation_rows: Sequence[EvaluationRow],
+    graph_rows: Sequence[GraphRow],
     *,
     n_goals: int,
     changes: Sequence[int],
@@ -174,7 +181,10 @@ def summarise(
     spans = eras(changes, n_epochs) if n_epochs else []
     parts = tuple(
         _summarise_era(
-            era, [row for row in evaluation_rows if era.from_epoch <= row.rules_epoch < era.until_epoch], best
+            era,
+            [row for row in evaluation_rows if era.holds(row.rules_epoch)],
+            [row for row in graph_rows if era.holds(row.rules_epoch)],
+            best,
         )
         for era, best in zip(spans, optima, strict=False)
     )
@@ -190,12 +200,14 @@ def summarise(
     )
 
 
-def _summarise_era(era: Era, rows: Sequence[EvaluationRow], optima: Sequence[int | None]) -> EraSummary:
+def _summarise_era(
+    era: Era, rows: Sequence[EvaluationRow], graph_rows: Sequence[GraphRow], optima: Sequence[int | None]
+) -> EraSummary:
     by_epoch: dict[int, list[EvaluationRow]] = {}
     for row in rows:
         by_epoch.setdefault(row.epoch, []).append(row)
     mastered = [(epoch, all(map(is_mastered, of_epoch))) for epoch, of_epoch in sorted(by_epoch.items())]
-    right = [(epoch, is_graph_right(of_epoch)) for epoch, of_epoch in sorted(by_epoch.items())]
+    right = [(row.epoch, row.n_wrong == 0) for row in graph_rows]
     settled_from = max(era.from_epoch, era.until_epoch - SETTLED_EPOCHS)
     settled = [[row for row in rows if row.goal == goal and row.epoch > settled_from] for goal in range(len(optima))]
     trials = tuple(_ratio(_total(of_goal, "trials_achieved"), _total(of_goal, "n_successes")) for of_goal in settled)

@@ -18,7 +18,8 @@ from learning.run_folder import RunFolder
 from robot.cli import app
 from tests.support.toy_folder import make_toy_folder
 
-FILES = ("config.yaml", "evaluations.csv", "goals.csv", "profile.json", "run.json", "summary.json", "trials.csv")
+TABLES = ("evaluations.csv", "goals.csv", "graphs.csv", "trials.csv")
+FILES = ("config.yaml", "profile.json", "run.json", "summary.json", *TABLES)
 
 
 def autotelic(*arguments):
@@ -210,5 +211,5 @@ def test_ctrl_c_stops_at_an_epochs_end_and_resuming_gives_the_uninterrupted_run(
     assert resumed.exit_code == 0, resumed.output
     whole = learn("unbroken", *long)
     assert whole.exit_code == 0
-    for name in ("trials.csv", "goals.csv", "evaluations.csv"):
+    for name in TABLES:
         assert (folder / "stopped" / name).read_bytes() == (folder / "unbroken" / name).read_bytes()

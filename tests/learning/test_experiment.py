@@ -11,7 +11,7 @@ import pytest
 from learning.errors import TooManyVoidEpochsError
 from learning.interfaces import TrialOutcome
 from learning.metrics import optimal_trials, summarise
-from learning.rows import EvaluationRow, GoalRow, TrialRow, read_rows
+from learning.rows import EvaluationRow, GoalRow, GraphRow, TrialRow, read_rows
 from tests.support.toy_learner import CHANGE_EPOCH, N_GOALS, toy_allowed
 from tests.support.toy_run import FILES, PROTOCOL, ToyRun, files_of
 
@@ -35,7 +35,7 @@ def optima():
 def test_the_toy_learns_recovers_and_needs_no_more_trials_than_the_optimum(whole):
     goals = read_rows(whole / "goals.csv", GoalRow)
     evaluations = read_rows(whole / "evaluations.csv", EvaluationRow)
-    summary = summarise(goals, evaluations, n_goals=N_GOALS, changes=[CHANGE_EPOCH], optima=optima())
+    summary = summarise(goals, evaluations, [], n_goals=N_GOALS, changes=[CHANGE_EPOCH], optima=optima())
     assert optima() == [(1, 1, 2, 4), (1, 1, 1, 2)]
     assert [era.learnt_after for era in summary.eras] == [pytest.approx(30, abs=20), pytest.approx(20, abs=20)]
     assert summary.eras[1].success_by_goal == (1.0,) * N_GOALS
@@ -53,6 +53,8 @@ def test_rows_are_complete_and_in_order(whole):
         assert sum(trial.n_steps for trial in of_epoch) == row.n_steps
         assert all(trial.goal == row.goal for trial in of_epoch)
         assert bool(row.is_achieved) == (of_epoch[-1].state_after[row.goal] == "1")
+    graphs = read_rows(whole / "graphs.csv", GraphRow)
+    assert [row.epoch for row in graphs] == [10, 20, 30, 40, 50, 60, 60, 70, 80, 90, 100, 110, 120]
     epochs = [10, 20, 40, 60, 60, 70, 80, 100, 120]
     assert [(row.epoch, row.goal) for row in evaluations] == [(e, g) for e in epochs for g in range(N_GOALS)]
     assert [row.rules_epoch for row in evaluations if row.epoch == 60] == [59] * N_GOALS + [60] * N_GOALS

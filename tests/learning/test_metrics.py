@@ -7,17 +7,17 @@ from learning.interfaces import TrialOutcome
 from learning.metrics import (
     Era,
     due_evaluations,
+    due_graph_looks,
     eras,
     first_running,
     graph_errors,
-    is_graph_right,
     is_mastered,
     optimal_trials,
     reachable_states,
     summarise,
 )
-from learning.rows import EvaluationRow, GoalRow, TrialRow, cells, header, read_rows
-from learning.tables import Tables
+from learning.rows import EvaluationRow, GoalRow, GraphRow, TrialRow, cells, header, read_rows
+from learning.tables import TABLES, Tables
 
 
 def before(goal, state):
@@ -43,6 +43,12 @@ def row(epoch, goal=0, *, rules_epoch=None, hits=20, tests=20, trials=1, wrong=0
         n_steps=100,
         graph_cases=4,
         graph_wrong=wrong,
+    )
+
+
+def look(epoch, wrong=0, *, rules_epoch=None):
+    return GraphRow(
+        epoch=epoch, rules_epoch=epoch - 1 if rules_epoch is None else rules_epoch, n_cases=8, n_wrong=wrong
     )
 
 
@@ -109,10 +115,9 @@ def test_learnt_is_the_first_of_two_evaluations_running():
     assert first_running([], running=1) is None
 
 
-def test_a_graph_is_right_only_where_it_was_compared_and_never_wrong():
-    assert is_graph_right([row(10, 0), row(10, 1)])
-    assert not is_graph_right([row(10, 0), row(10, 1, wrong=1)])
-    assert not is_graph_right([])
+def test_the_graph_is_looked_at_every_so_often_and_under_both_rules_at_a_change():
+    due = {n: rules for n in range(36) if (rules := due_graph_looks(n, every=10, changes=[15], n_epochs=35))}
+    assert due == {10: [9], 15: [14, 15], 20: [19], 30: [29], 35: [34]}
 
 
 def test_a_summary_worked_by_hand():
@@ -124,13 +129,14 @@ def test_a_summary_worked_by_hand():
         row(200, 0, hits=18), row(200, 1, trials=3),
     ]  # fmt: skip
     goals = [choice(epoch, goal=epoch % 2) for epoch in range(200)]
-    summary = summarise(goals, evaluations, n_goals=2, changes=[100], optima=[(1, 2), (1, 2)])
+    graphs = [look(40, 3), look(50), look(60, 1), look(100), look(100, 4, rules_epoch=100), look(130), look(140)]
+    summary = summarise(goals, evaluations, graphs, n_goals=2, changes=[100], optima=[(1, 2), (1, 2)])
     first, second = summary.eras
     assert (summary.n_epochs, summary.n_trials, summary.n_time_steps) == (200, 400, 2000)
     assert summary.choices_by_goal == (100, 100)
     assert summary.time_steps_to_all is None
     assert (first.learnt_after, first.graph_right_after) == (None, 50)
-    assert (second.learnt_after, second.graph_right_after) == (50, 50)
+    assert (second.learnt_after, second.graph_right_after) == (50, 30)
     assert second.success_by_goal == (38 / 40, 1.0)
     assert second.trials_by_goal == (1.0, 2.5)
     assert second.trials_over_optimum == pytest.approx((0.0 + 0.5) / 2)
@@ -141,7 +147,7 @@ def test_a_summary_worked_by_hand():
 def test_time_steps_to_all_are_those_before_everything_was_learnt():
     evaluations = [row(50), row(100), row(150)]
     goals = [choice(epoch, steps=epoch) for epoch in range(150)]
-    summary = summarise(goals, evaluations, n_goals=1, changes=[], optima=[(1,)])
+    summary = summarise(goals, evaluations, [], n_goals=1, changes=[], optima=[(1,)])
     assert summary.eras[0].learnt_after == 50
     assert summary.time_steps_to_all == sum(range(50))
 
@@ -149,7 +155,7 @@ def test_time_steps_to_all_are_those_before_everything_was_learnt():
 def test_only_the_last_two_hundred_epochs_of_an_era_count_as_settled():
     evaluations = [row(800, hits=0), row(801, trials=1), row(1000, trials=1)]
     goals = [choice(epoch) for epoch in range(1000)]
-    summary = summarise(goals, evaluations, n_goals=1, changes=[], optima=[(1,)])
+    summary = summarise(goals, evaluations, [], n_goals=1, changes=[], optima=[(1,)])
     assert summary.eras[0].success_by_goal == (1.0,)
 
 
@@ -193,7 +199,7 @@ def test_what_is_no_such_table_is_refused(tmp_path, text):
 def test_tables_are_cut_back_to_the_rows_a_checkpoint_knew_and_go_on_from_there(tmp_path):
     with Tables(tmp_path) as tables:
         tables.append("trials", [trial_row(0)])
-        n_rows = {name: tables.n_rows(name) for name in ("trials", "goals", "evaluations")}
+        n_rows = {name: tables.n_rows(name) for name in TABLES}
         tables.append("trials", [trial_row(1), trial_row(2)])
     whole = (tmp_path / "trials.csv").read_bytes()
     (tmp_path / "trials.csv").write_bytes(whole + b"torn,li")
@@ -209,10 +215,10 @@ def test_a_table_with_fewer_rows_than_its_checkpoint_knew_is_refused(tmp_path):
     torn = (tmp_path / "goals.csv").read_bytes()[:-1]
     (tmp_path / "goals.csv").write_bytes(torn)
     with pytest.raises(RunFolderError, match=r"goals\.csv: expected the 2 rows .* got 1"):
-        Tables(tmp_path, n_rows={"trials": 0, "goals": 2, "evaluations": 0})
+        Tables(tmp_path, n_rows=dict.fromkeys(TABLES, 0) | {"goals": 2})
     (tmp_path / "goals.csv").unlink()
     with pytest.raises(RunFolderError, match="got 0"):
-        Tables(tmp_path, n_rows={"trials": 0, "goals": 2, "evaluations": 0})
+        Tables(tmp_path, n_rows=dict.fromkeys(TABLES, 0) | {"goals": 2})
 
 
 def asdict(value):
