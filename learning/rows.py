@@ -1,4 +1,4 @@
-"""The rows of a run's metrics, as other tools read them: trials, goal choices, looks at the graph, evaluations."""
+"""The rows of a run's metrics, as other tools read them: trials, goal choices, evaluations by goal, graph looks."""
 
 import csv
 from collections.abc import Iterable
