@@ -75,7 +75,9 @@ class SubgoalSelection(Section, frozen=True, kw_only=True):
     retest: Share = 0.0
     """Chance per epoch that something believed is tried out again, to notice what is needed no longer."""
     use_blocked_only: bool = True
-    """Only trials that reached the place but were blocked are evidence against."""
+    """Trials that reached the place but were blocked are full evidence against, others only by miss_weight."""
+    miss_weight: Share = 0.5
+    """Power of the evidence of a trial that did not reach the place, on top of what the expert's skill makes of it."""
 
 
 class Expert(Section, frozen=True, kw_only=True):

@@ -18,9 +18,11 @@ LEAST_SKILL = 0.05
 KNOWN = 0.5
 """Least chance of being allowed at a plan's end for it to count as a known way."""
 BEGINNERS_LUCK = 0.15
-"""Chance that an expert without one success achieves its goal in a trial where it is allowed."""
+"""Least chance that an expert, skilled or not, achieves its goal in a trial where it is allowed."""
 LOSS = 0.02
 """Chance that achieving a goal loses another, before it was ever seen."""
+FORGET = 0.98
+"""How much of an expert's best skill is still believed after each later attempt."""
 N_EVIDENCE = 200
 """Attempts remembered per goal, to be told to a person; nothing is learnt from them twice."""
 N_CARRIED = 20.0
@@ -50,12 +52,12 @@ class Graph:
             for g in range(n_goals)
         )
         self._skill = [1.0] * n_goals
+        self._best_skill = [0.0] * n_goals
+        """Of its better days: tried where nothing is to be had, an expert looks unskilled."""
         self._carried = np.zeros((n_goals, n_goals))
         self._lost = np.zeros((n_goals, n_goals))
         """[j, k]: how often goal k held when goal j was achieved, and then held no longer."""
         self._changed_epoch: list[int | None] = [None] * n_goals
-        self._came_about = [False] * n_goals
-        """Goals that were achieved at least once."""
         self._log = tuple(deque[Evidence](maxlen=N_EVIDENCE) for _ in range(n_goals))
 
     # ------------------------------------------------------------------------------------------------------ learn
@@ -66,14 +68,15 @@ class Graph:
         if outcome is TrialOutcome.VOID:
             return ()
         self._skill[tried] = attempt.skill
+        self._best_skill[tried] = max(attempt.skill, FORGET * self._best_skill[tried])
         findings: list[Finding] = []
         if outcome is TrialOutcome.ACHIEVED:
             self._count_losses(attempt)
             findings.append(self._update(tried, attempt, is_achieved=True))
         elif outcome is TrialOutcome.BLOCKED or not self._config.use_blocked_only:
             findings.append(self._update(tried, attempt, is_achieved=False))
-        elif not self._came_about[tried]:
-            self._doubt(tried, attempt)
+        elif self._config.miss_weight:
+            findings.append(self._miss(tried, attempt))
         for i, (was_on, is_on) in enumerate(zip(attempt.state, attempt.state_after, strict=True)):
             if is_on and not was_on and i != tried:
                 findings.append(self._update(i, attempt, is_achieved=True))
@@ -81,7 +84,6 @@ class Graph:
 
     def _update(self, goal: int, attempt: Attempt, *, is_achieved: bool) -> Finding:
         belief, before = self.beliefs[goal], self.most_probable(goal)
-        self._came_about[goal] |= is_achieved
         evidence = Evidence(
             epoch=attempt.epoch, is_achieved=is_achieved, readings=_readings(goal, attempt, is_achieved=is_achieved)
         )
@@ -95,17 +97,24 @@ class Graph:
             self._changed_epoch[goal] = attempt.epoch
         return Finding(goal=goal, situation=_situation(attempt), expected=expected, is_revised=is_revised)
 
-    def _doubt(self, goal: int, attempt: Attempt) -> None:
-        """Trust a goal-state a little less where a goal that never came about did not come about once more.
+    def _miss(self, goal: int, attempt: Attempt) -> Finding:
+        """Trust a goal-state a little less where a goal did not come about, the less the more skilled its expert is.
 
-        An expert without one success may be unskilled, or the goal not allowed here: each trial weighs a little, so
-        that a search for the first success does not stay in one goal-state for ever.
+        An expert that did not reach the place may be unskilled, or the goal not allowed here. Were misses no evidence
+        at all, one success for a strange reason (two objects between the jaws) could make the learner try for ever
+        where nothing is to be had and no place is reached; and a search for a first success would never move on.
         """
+        belief, before = self.beliefs[goal], self.most_probable(goal)
         evidence = Evidence(
             epoch=attempt.epoch, is_achieved=False, readings=_readings(goal, attempt, is_achieved=False)
         )
-        luck = Likelihood(p_hit=BEGINNERS_LUCK, false_positive=self._config.false_positive)
-        self.beliefs[goal].update(evidence, luck)
+        p_hit = min(max(self._best_skill[goal], BEGINNERS_LUCK), 1.0 - self._config.blocked_error)
+        likelihood = Likelihood(p_hit=p_hit, false_positive=self._config.false_positive)
+        expected = belief.update(evidence, likelihood, weight=self._config.miss_weight)
+        is_revised = self.most_probable(goal) != before
+        if is_revised:
+            self._changed_epoch[goal] = attempt.epoch
+        return Finding(goal=goal, situation=_situation(attempt), expected=expected, is_revised=is_revised)
 
     def _likelihood(self, skill: float) -> Likelihood:
         """Return how telling an attempt is. An expert that was at the place fails less often than its skill says."""
@@ -207,10 +216,10 @@ class Graph:
         return {
             "beliefs": [belief.state_dict() for belief in self.beliefs],
             "skill": list(self._skill),
+            "best_skill": list(self._best_skill),
             "carried": self._carried.copy(),
             "lost": self._lost.copy(),
             "changed_epoch": list(self._changed_epoch),
-            "came_about": list(self._came_about),
             "log": [[msgspec.json.decode(msgspec.json.encode(evidence)) for evidence in kept] for kept in self._log],
         }
 
@@ -219,10 +228,10 @@ class Graph:
         for belief, loaded in zip(self.beliefs, state["beliefs"], strict=True):
             belief.load_state_dict(loaded)
         self._skill = list(state["skill"])
+        self._best_skill = list(state["best_skill"])
         self._carried = np.array(state["carried"], dtype=float)
         self._lost = np.array(state["lost"], dtype=float)
         self._changed_epoch = list(state["changed_epoch"])
-        self._came_about = list(state["came_about"])
         for kept, loaded in zip(self._log, state["log"], strict=True):
             kept.clear()
             kept.extend(msgspec.convert(loaded, list[Evidence]))

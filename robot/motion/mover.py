@@ -3,6 +3,7 @@
 import math
 
 from config.arm import ArmConfig
+from robot.geometry import inside_box
 from robot.messages import ArmState, Heading, Intent, JointTarget, Twist, Vec3, Vec6
 from robot.motion.contact import ContactGuard
 from robot.motion.follower import Follower
@@ -80,14 +81,21 @@ class Mover:
             moved = self._contact.reseat(state.tcp_force_n, state.tcp_position_m, commanded_m, follower.target_m)
             if moved is not None:
                 self._limiters.append("contact")
-                yaw, back = follower.yaw_rad, self._back_to(state.q_rad)
-                follower.seed(back)
-                follower.aim(moved, yaw)
-                return back
+                return self._give_way(moved, state)
         q = follower.step()
         if follower.trouble is not None:
             self._limiters.append(follower.trouble)
         return q
+
+    def _give_way(self, target_m: Vec3, state: ArmState) -> Vec6:
+        """Fall back to the measured joints and aim at a target, but never let a push carry the command past a fence."""
+        follower, (low, high) = self._follower, self._limits.workspace_m
+        yaw, back = follower.yaw_rad, self._back_to(state.q_rad)
+        if not inside_box(follower.tcp(back), low, high):
+            back = follower.q_rad
+        follower.seed(back)
+        follower.aim(fence(target_m, state.tcp_position_m, self._limits).position_m, yaw)
+        return back
 
     def _follow(self, shaped: Shaped, yaw_rad: float, state: ArmState) -> None:
         self._limiters.extend(shaped.limiters)

@@ -166,3 +166,21 @@ def test_seeding_forgets_everything_before(arm):
     assert arm.q == fresh.q
     assert arm.mover.target_m == fresh.mover.target_m
     assert arm.mover.is_in_contact == fresh.mover.is_in_contact
+
+
+def test_however_long_the_tool_is_pushed_the_command_stays_inside_the_fence(arm):
+    # Seen on the twin: a held object wedged on a box's wall near the edge of the workspace walked the tool outwards,
+    # a millimetre a tick, because the command fell back to the measured joints each time.
+    low, high = ARM.motion.workspace_m
+    for _ in range(14):
+        arm.step(go(angle=-math.pi / 2))
+    mover = arm.mover
+    pushed = KINEMATICS.tcp(arm.q)
+    for k in range(200):
+        if k % 5 == 0:
+            mover.begin_step(go(angle=-math.pi / 2, height=0.025), arm.state, duration_s=5 * DT)
+        commanded = KINEMATICS.tcp(mover.tick(arm_state(arm.q, tcp_m=pushed, force_n=(0.0, -20.0, 5.0))))
+        assert all(a - 1e-6 <= x <= b + 1e-6 for a, x, b in zip(low, commanded, high, strict=True))
+        pushed = (pushed[0], pushed[1] - 0.001, pushed[2])
+        arm.q = KINEMATICS.solve(pushed, arm.q)
+    assert pushed[1] < low[1] - 0.1
