@@ -18,7 +18,11 @@ LEAST_SKILL = 0.05
 KNOWN = 0.5
 """Least chance of being allowed at a plan's end for it to count as a known way."""
 BEGINNERS_LUCK = 0.15
-"""Least chance that an expert, skilled or not, achieves its goal in a trial where it is allowed."""
+"""Chance that an expert without one success achieves its goal in a trial where it is allowed."""
+GOOD = 0.5
+"""Skill that an expert must have had for its missing the place to say something of what the goal needs."""
+LASTING, LOST = 10, -1
+"""Trials that a goal must have been seen to hold through before it counts as one that does not come and go."""
 LOSS = 0.02
 """Chance that achieving a goal loses another, before it was ever seen."""
 FORGET = 0.98
@@ -52,8 +56,12 @@ class Graph:
             for g in range(n_goals)
         )
         self._skill = [1.0] * n_goals
+        self._came_about = [False] * n_goals
+        """Goals that were achieved at least once."""
         self._best_skill = [0.0] * n_goals
         """Of its better days: tried where nothing is to be had, an expert looks unskilled."""
+        self._n_lasted = [0] * n_goals
+        """Trials through which a goal held; LOST once it was lost: a thing taken can be let go again."""
         self._carried = np.zeros((n_goals, n_goals))
         self._lost = np.zeros((n_goals, n_goals))
         """[j, k]: how often goal k held when goal j was achieved, and then held no longer."""
@@ -69,13 +77,16 @@ class Graph:
             return ()
         self._skill[tried] = attempt.skill
         self._best_skill[tried] = max(attempt.skill, FORGET * self._best_skill[tried])
+        self._note_fleeting(attempt)
         findings: list[Finding] = []
         if outcome is TrialOutcome.ACHIEVED:
             self._count_losses(attempt)
             findings.append(self._update(tried, attempt, is_achieved=True))
         elif outcome is TrialOutcome.BLOCKED or not self._config.use_blocked_only:
             findings.append(self._update(tried, attempt, is_achieved=False))
-        elif self._config.miss_weight:
+        elif not self._came_about[tried]:
+            self._doubt(tried, attempt)
+        elif self._config.miss_weight and self._best_skill[tried] >= GOOD and not self._has_hands_full(attempt):
             findings.append(self._miss(tried, attempt))
         for i, (was_on, is_on) in enumerate(zip(attempt.state, attempt.state_after, strict=True)):
             if is_on and not was_on and i != tried:
@@ -84,6 +95,7 @@ class Graph:
 
     def _update(self, goal: int, attempt: Attempt, *, is_achieved: bool) -> Finding:
         belief, before = self.beliefs[goal], self.most_probable(goal)
+        self._came_about[goal] |= is_achieved
         evidence = Evidence(
             epoch=attempt.epoch, is_achieved=is_achieved, readings=_readings(goal, attempt, is_achieved=is_achieved)
         )
@@ -97,24 +109,45 @@ class Graph:
             self._changed_epoch[goal] = attempt.epoch
         return Finding(goal=goal, situation=_situation(attempt), expected=expected, is_revised=is_revised)
 
-    def _miss(self, goal: int, attempt: Attempt) -> Finding:
-        """Trust a goal-state a little less where a goal did not come about, the less the more skilled its expert is.
+    def _doubt(self, goal: int, attempt: Attempt) -> None:
+        """Trust a goal-state a little less where a goal that never came about did not come about once more.
 
-        An expert that did not reach the place may be unskilled, or the goal not allowed here. Were misses no evidence
-        at all, one success for a strange reason (two objects between the jaws) could make the learner try for ever
-        where nothing is to be had and no place is reached; and a search for a first success would never move on.
+        An expert without one success may be unskilled, or the goal not allowed here: each trial weighs a little, so
+        that a search for the first success does not stay in one goal-state for ever.
+        """
+        self.beliefs[goal].update(_failure(goal, attempt), self._luck(BEGINNERS_LUCK))
+
+    def _miss(self, goal: int, attempt: Attempt) -> Finding:
+        """Trust a goal-state less where an expert that has been good did not even reach the place.
+
+        Were its misses no evidence at all, one success for a strange reason (two objects between the jaws) could make
+        the learner try for ever where nothing is to be had and no place is reached.
         """
         belief, before = self.beliefs[goal], self.most_probable(goal)
-        evidence = Evidence(
-            epoch=attempt.epoch, is_achieved=False, readings=_readings(goal, attempt, is_achieved=False)
-        )
-        p_hit = min(max(self._best_skill[goal], BEGINNERS_LUCK), 1.0 - self._config.blocked_error)
-        likelihood = Likelihood(p_hit=p_hit, false_positive=self._config.false_positive)
-        expected = belief.update(evidence, likelihood, weight=self._config.miss_weight)
+        p_hit = min(self._best_skill[goal], 1.0 - self._config.blocked_error)
+        expected = belief.update(_failure(goal, attempt), self._luck(p_hit), weight=self._config.miss_weight)
         is_revised = self.most_probable(goal) != before
         if is_revised:
             self._changed_epoch[goal] = attempt.epoch
         return Finding(goal=goal, situation=_situation(attempt), expected=expected, is_revised=is_revised)
+
+    def _luck(self, p_hit: float) -> Likelihood:
+        return Likelihood(p_hit=p_hit, false_positive=self._config.false_positive)
+
+    def _note_fleeting(self, attempt: Attempt) -> None:
+        """Take in which goals held through a trial, and which did not."""
+        if attempt.holds is None or attempt.holds_after is None:
+            return
+        for k, (held, holds) in enumerate(zip(attempt.holds, attempt.holds_after, strict=True)):
+            if held and not holds:
+                self._n_lasted[k] = LOST
+            elif held and self._n_lasted[k] != LOST:
+                self._n_lasted[k] += 1
+
+    def _has_hands_full(self, attempt: Attempt) -> bool:
+        """Whether something held before or after the trial that may come and go: a full hand takes nothing else."""
+        holds = mask(attempt.holds or ()) | mask(attempt.holds_after or ())
+        return any(holds >> k & 1 and n < LASTING for k, n in enumerate(self._n_lasted))
 
     def _likelihood(self, skill: float) -> Likelihood:
         """Return how telling an attempt is. An expert that was at the place fails less often than its skill says."""
@@ -216,7 +249,9 @@ class Graph:
         return {
             "beliefs": [belief.state_dict() for belief in self.beliefs],
             "skill": list(self._skill),
+            "came_about": list(self._came_about),
             "best_skill": list(self._best_skill),
+            "n_lasted": list(self._n_lasted),
             "carried": self._carried.copy(),
             "lost": self._lost.copy(),
             "changed_epoch": list(self._changed_epoch),
@@ -228,7 +263,9 @@ class Graph:
         for belief, loaded in zip(self.beliefs, state["beliefs"], strict=True):
             belief.load_state_dict(loaded)
         self._skill = list(state["skill"])
+        self._came_about = list(state["came_about"])
         self._best_skill = list(state["best_skill"])
+        self._n_lasted = list(state["n_lasted"])
         self._carried = np.array(state["carried"], dtype=float)
         self._lost = np.array(state["lost"], dtype=float)
         self._changed_epoch = list(state["changed_epoch"])
@@ -240,6 +277,10 @@ class Graph:
 def _situation(attempt: Attempt) -> Situation:
     latched = mask(attempt.state)
     return Situation(latched if attempt.holds is None else latched & mask(attempt.holds), latched)
+
+
+def _failure(goal: int, attempt: Attempt) -> Evidence:
+    return Evidence(epoch=attempt.epoch, is_achieved=False, readings=_readings(goal, attempt, is_achieved=False))
 
 
 def _readings(goal: int, attempt: Attempt, *, is_achieved: bool) -> tuple[Situation, ...]:

@@ -15,6 +15,7 @@ from robot.bench import BenchReport, BenchResult, bench_report
 from robot.local_station import LocalStation
 from robot.messages import Heading
 from robot.rigs import build_operator, build_station
+from sim_twin.names import on_table
 from sim_twin.pilot import Pilot
 from sim_twin.plant import TwinPlant, TwinWorld
 
@@ -231,4 +232,4 @@ def _in_hand(plant: TwinPlant, name: str) -> np.ndarray:
     data = plant.world.data
     mujoco.mj_kinematics(plant.world.model, data)
     tcp = data.site("tcp")
-    return tcp.xmat.reshape(3, 3).T @ (data.body(name).xpos - tcp.xpos)
+    return tcp.xmat.reshape(3, 3).T @ (data.body(on_table(name)).xpos - tcp.xpos)

@@ -29,6 +29,7 @@ from robot.messages import (
     Vec6,
 )
 from sim_twin.layout import Layout, draw_layout
+from sim_twin.names import on_table
 from sim_twin.scene import build_scene
 from sim_twin.table import TableDrive
 
@@ -95,13 +96,13 @@ class TwinWorld:
         """Place everything (a reset): the only teleport there is."""
         model, data, tool = self.model, self.data, self.arm.tool
         for name, (x, y) in layout.fixtures_m.items():
-            model.body(name).pos[:2] = (x, y)
+            model.body(on_table(name)).pos[:2] = (x, y)
         # With sleeping on, what cannot move is placed by the reset and never again: move fixtures before it.
         mujoco.mj_resetData(model, data)
         self.stop_speed_rad_s = None
         for cylinder in self.scenario.cylinders:
             standing = layout.cylinders[cylinder.name]
-            address = int(model.joint(cylinder.name).qposadr[0])
+            address = int(model.joint(on_table(cylinder.name)).qposadr[0])
             height = self.scenario.table.height_m + cylinder.height_m / 2
             data.qpos[address : address + 3] = (*standing.position_m, height)
             data.qpos[address + 3 : address + 7] = (np.cos(standing.yaw_rad / 2), 0, 0, np.sin(standing.yaw_rad / 2))
@@ -223,7 +224,11 @@ class TwinTruth:
         self._world = world
         scenario, model = world.scenario, world.model
         self._entries = [
-            (e.name, model.body(e.name).id, model.body(f"{e.name}_cap").id if e in scenario.buttons else None)
+            (
+                e.name,
+                model.body(on_table(e.name)).id,
+                model.body(on_table(e.name, "cap")).id if e in scenario.buttons else None,
+            )
             for e in (*scenario.buttons, *scenario.boxes, *scenario.cylinders)
         ]
 

@@ -8,6 +8,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from sim_twin.names import on_table
 from sim_twin.plant import TwinWorld
 
 __all__ = ["NoGLError", "Picture", "open_renderer", "render"]
@@ -58,5 +59,5 @@ def light_lamps(world: TwinWorld) -> None:
         is_lit = bool(world.digital_out >> button.lamp_output & 1)
         colour = np.asarray(button.colour)
         shown = colour + (1.0 - colour) * GLOW if is_lit else colour * 0.8
-        world.model.geom(f"{button.name}_dome").rgba[:3] = shown
-        world.model.geom(f"{button.name}_cap").rgba[:3] = shown * 0.9
+        world.model.geom(on_table(button.name, "dome")).rgba[:3] = shown
+        world.model.geom(on_table(button.name, "cap")).rgba[:3] = shown * 0.9

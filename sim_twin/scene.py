@@ -12,6 +12,7 @@ from config.scenario import Box, Button, Cylinder, Scenario
 from config.values import Point
 from robot.description import FIXTURE_CONTACT, GRIP_SOLIMP, GRIP_SOLREF, OBJECT_CONTACT, arm_spec
 from robot.servo import lag_s
+from sim_twin.names import on_table
 
 __all__ = ["LEAF_THICKNESS_M", "build_scene", "leaf_names"]
 
@@ -51,7 +52,7 @@ def build_scene(arm: ArmConfig, scenario: Scenario, *, physics_s: float, tick_s:
 
 def leaf_names(box: Box) -> tuple[str, str]:
     """Return the joint names of a box's two lid leaves."""
-    return f"{box.name}_leaf_near", f"{box.name}_leaf_far"
+    return on_table(box.name, "leaf_near"), on_table(box.name, "leaf_far")
 
 
 def _set_options(spec: mujoco.MjSpec, physics_s: float) -> None:
@@ -111,32 +112,32 @@ def _add_button(spec: mujoco.MjSpec, button: Button, table_m: float) -> None:
     """A cap on a preloaded spring inside a dark ring; the cap wears a dome."""
     radius = button.diameter_m / 2
     cap_half = 0.006
-    base = spec.worldbody.add_body(name=button.name, pos=[*button.position_m, table_m])
+    base = spec.worldbody.add_body(name=on_table(button.name), pos=[*button.position_m, table_m])
     ring = button.height_m - button.travel_m - 2 * cap_half
     base.add_geom(
         type=_CYLINDER, size=[radius + 0.006, ring / 2, 0], pos=[0, 0, ring / 2], rgba=[0.16, 0.17, 0.18, 1],
         friction=[0.6, 0.01, 0.0001], **_FIXTURE,
     )  # fmt: skip
-    cap = base.add_body(name=f"{button.name}_cap", pos=[0, 0, button.height_m - cap_half])
+    cap = base.add_body(name=on_table(button.name, "cap"), pos=[0, 0, button.height_m - cap_half])
     cap.add_joint(
-        name=f"{button.name}_travel", type=mujoco.mjtJoint.mjJNT_SLIDE, axis=[0, 0, -1], range=[0, button.travel_m],
-        limited=mujoco.mjtLimited.mjLIMITED_TRUE, stiffness=800.0, springref=-0.004, damping=4.0,
-        solref_limit=[0.008, 1.0],
+        name=on_table(button.name, "travel"), type=mujoco.mjtJoint.mjJNT_SLIDE, axis=[0, 0, -1],
+        range=[0, button.travel_m], limited=mujoco.mjtLimited.mjLIMITED_TRUE, stiffness=800.0, springref=-0.004,
+        damping=4.0, solref_limit=[0.008, 1.0],
     )  # fmt: skip
     cap.add_geom(
-        name=f"{button.name}_cap", type=_CYLINDER, size=[radius, cap_half, 0], mass=0.05,
+        name=on_table(button.name, "cap"), type=_CYLINDER, size=[radius, cap_half, 0], mass=0.05,
         friction=[0.6, 0.01, 0.0001], rgba=[*button.colour, 1], **_FIXTURE,
     )  # fmt: skip
     cap.add_geom(
-        name=f"{button.name}_dome", type=mujoco.mjtGeom.mjGEOM_ELLIPSOID, size=[radius * 0.97, radius * 0.97, 0.009],
-        pos=[0, 0, cap_half - 0.003], rgba=[*button.colour, 1], **_LOOK,
+        name=on_table(button.name, "dome"), type=mujoco.mjtGeom.mjGEOM_ELLIPSOID,
+        size=[radius * 0.97, radius * 0.97, 0.009], pos=[0, 0, cap_half - 0.003], rgba=[*button.colour, 1], **_LOOK,
     )  # fmt: skip
 
 
 def _add_box(spec: mujoco.MjSpec, box: Box, table_m: float) -> None:
     """Four walls on the table, and two lid leaves hinged at the walls that face the robot and look away from it."""
     (lx, ly), w, h = box.inner_m, box.wall_m, box.height_m
-    body = spec.worldbody.add_body(name=box.name, pos=[*box.position_m, table_m])
+    body = spec.worldbody.add_body(name=on_table(box.name), pos=[*box.position_m, table_m])
     body.add_geom(type=_BOX, size=[lx / 2, ly / 2, 0.0006], pos=[0, 0, 0.0004], rgba=[*_dim(box.colour), 1], **_LOOK)
     for axis, sign in ((0, 1), (0, -1), (1, 1), (1, -1)):
         size = [w / 2, ly / 2 + w, h / 2] if axis == 0 else [lx / 2, w / 2, h / 2]
@@ -165,17 +166,17 @@ def _add_box(spec: mujoco.MjSpec, box: Box, table_m: float) -> None:
         )  # fmt: skip
         drive.set_to_position(kp=2.0, kv=0.08)
         spec.add_equality(
-            name=f"{name}_lock", type=mujoco.mjtEq.mjEQ_JOINT, name1=name, objtype=mujoco.mjtObj.mjOBJ_JOINT,
+            name=f"{name}/lock", type=mujoco.mjtEq.mjEQ_JOINT, name1=name, objtype=mujoco.mjtObj.mjOBJ_JOINT,
             data=[0.0] * 12, active=False, solref=[0.01, 1.0],
         )  # fmt: skip
 
 
 def _add_cylinder(spec: mujoco.MjSpec, cylinder: Cylinder) -> None:
-    body = spec.worldbody.add_body(name=cylinder.name, pos=[*cylinder.position_m, cylinder.height_m / 2])
-    body.add_freejoint(name=cylinder.name)
+    body = spec.worldbody.add_body(name=on_table(cylinder.name), pos=[*cylinder.position_m, cylinder.height_m / 2])
+    body.add_freejoint(name=on_table(cylinder.name))
     contype, conaffinity = OBJECT_CONTACT
     body.add_geom(
-        name=cylinder.name, type=_CYLINDER, size=[cylinder.diameter_m / 2, cylinder.height_m / 2, 0],
+        name=on_table(cylinder.name), type=_CYLINDER, size=[cylinder.diameter_m / 2, cylinder.height_m / 2, 0],
         mass=cylinder.mass_kg, friction=[cylinder.friction, 0.005, 0.0001], condim=3, rgba=[*cylinder.colour, 1],
         solref=GRIP_SOLREF, solimp=GRIP_SOLIMP, contype=contype, conaffinity=conaffinity,
     )  # fmt: skip

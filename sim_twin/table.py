@@ -3,6 +3,7 @@
 import mujoco
 
 from config.scenario import Box, Button, Cylinder, Scenario
+from sim_twin.names import on_table
 from sim_twin.scene import leaf_names
 
 __all__ = ["TableDrive"]
@@ -15,7 +16,7 @@ class _Switch:
     """A button's contact with hysteresis on its travel."""
 
     def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, button: Button) -> None:
-        address = int(model.joint(f"{button.name}_travel").qposadr[0])
+        address = int(model.joint(on_table(button.name, "travel")).qposadr[0])
         self._travel_m = data.qpos[address : address + 1]
         self._closes_m, self._opens_m = CLOSES_AT * button.travel_m, OPENS_AT * button.travel_m
         self._bit = 1 << button.input
@@ -35,7 +36,7 @@ class _Lid:
         names = leaf_names(box)
         self.angle_addresses = [int(model.joint(n).qposadr[0]) for n in names]
         self._controls = [model.actuator(n).id for n in names]
-        self._locks = [model.equality(f"{n}_lock").id for n in names]
+        self._locks = [model.equality(f"{n}/lock").id for n in names]
         self._bit = 1 << box.lid.output
         self._open_rad = box.lid.open_angle_rad
         self._step_rad = box.lid.speed_rad_s * tick_s
@@ -76,9 +77,9 @@ class _Presence:
     def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, box: Box, cylinders: tuple[Cylinder, ...]) -> None:
         assert box.presence_input is not None
         self._bit = 1 << box.presence_input
-        self._centre_m = data.xpos[model.body(box.name).id]
+        self._centre_m = data.xpos[model.body(on_table(box.name)).id]
         self._half = (box.inner_m[0] / 2, box.inner_m[1] / 2, box.height_m)
-        self._positions_m = [data.xpos[model.body(c.name).id] for c in cylinders]
+        self._positions_m = [data.xpos[model.body(on_table(c.name)).id] for c in cylinders]
 
     def read(self) -> int:
         """Return the input's bit."""

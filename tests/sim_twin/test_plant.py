@@ -1,3 +1,5 @@
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -5,7 +7,10 @@ from config.loader import resolve
 from config.resolved import Resolved
 from robot.messages import ArmCommand, GripCommand
 from sim_twin.layout import draw_layout
+from sim_twin.names import on_table
 from sim_twin.plant import TwinPlant
+
+ROOT = Path(__file__).parents[2]
 
 
 @pytest.fixture(scope="module")
@@ -77,10 +82,10 @@ def test_lids_open_gently_stay_open_and_lock_only_when_shut(plant, resolved):
     plant.resetter.reset(seed=0, epoch=0, digital_out=0)
     world = plant.world
     model, data = world.model, world.data
-    leaves = [f"{b.name}_leaf_{side}" for b in resolved.scenario.boxes for side in ("near", "far")]
+    leaves = [on_table(b.name, f"leaf_{side}") for b in resolved.scenario.boxes for side in ("near", "far")]
     speeds = [data.qvel[int(model.joint(n).dofadr[0]) :][:1] for n in leaves]
     angles = [data.qpos[int(model.joint(n).qposadr[0]) :][:1] for n in leaves]
-    locks = [model.equality(f"{n}_lock").id for n in leaves]
+    locks = [model.equality(f"{n}/lock").id for n in leaves]
     assert data.eq_active[locks].all()
     fastest = 0.0
     for out, angle in ((LIDS, 1.85), (0, 0.0), (LIDS, 1.85)):
@@ -95,7 +100,7 @@ def test_lids_open_gently_stay_open_and_lock_only_when_shut(plant, resolved):
 
 def test_a_lid_pushes_no_harder_than_its_drive(plant, resolved):
     lid = resolved.scenario.boxes[0].lid
-    control = plant.world.model.actuator("red_box_leaf_near")
+    control = plant.world.model.actuator(on_table("red_box", "leaf_near"))
     leaf_m = resolved.scenario.boxes[0].inner_m[0] / 2
     assert float(control.forcerange[1]) / leaf_m <= 5.0 + 0.2
     assert lid.force_n <= 5.0
@@ -108,11 +113,11 @@ def test_a_shut_lid_cannot_be_pried_open_and_an_unlocked_one_can(plant):
         for _ in range(20):
             world.advance()
         world.digital_out = out
-        world.data.body("red_box_leaf_near").xfrc_applied[4] = -0.6
+        world.data.body(on_table("red_box", "leaf_near")).xfrc_applied[4] = -0.6
         for _ in range(30):
             world.advance()
-        moved = abs(float(world.data.joint("red_box_leaf_near").qpos[0]))
-        world.data.body("red_box_leaf_near").xfrc_applied[4] = 0.0
+        moved = abs(float(world.data.joint(on_table("red_box", "leaf_near")).qpos[0]))
+        world.data.body(on_table("red_box", "leaf_near")).xfrc_applied[4] = 0.0
         assert (moved > 0.2) is is_free
 
 
@@ -120,7 +125,7 @@ def test_an_untouched_button_reads_off_and_a_pressed_one_on_with_hysteresis(plan
     plant.resetter.reset(seed=0, epoch=0, digital_out=0)
     world, travel = plant.world, resolved.scenario.buttons[1].travel_m
     bit = 1 << resolved.scenario.buttons[1].input
-    joint = world.data.joint("green_button_travel")
+    joint = world.data.joint(on_table("green_button", "travel"))
     seen = []
     for share in (0.0, 0.5, 0.7, 0.5, 0.3):
         joint.qpos[0] = share * travel
@@ -146,3 +151,25 @@ def test_a_stop_comes_to_rest_and_keeps_the_grip(plant):
     assert max(abs(v) for v in after.qd_rad_s) < 1e-3
     assert abs(after.q_rad[0] - before.q_rad[0]) < 0.06
     assert after.grip.opening_m == pytest.approx(0.03, abs=0.002)
+
+
+def test_things_may_have_the_names_of_the_arms_own_parts_and_of_one_anothers(tmp_path):
+    text = (ROOT / "config" / "scenarios" / "paper.yaml").read_text()
+    for name, other in (
+        ("orange_button", "flange"), ("green_button", "base"), ("blue_button", "base_cap"), ("red_box", "link_3"),
+        ("blue_box", "grip"), ("red_cylinder", "finger_left"),
+    ):  # fmt: skip
+        text = text.replace(name, other)
+    for name in ("paper_before", "paper_after"):
+        rules = (ROOT / "config" / "rules" / f"{name}.yaml").read_text()
+        for old, new in (("green_button", "base"), ("blue_button", "base_cap"), ("orange_button", "flange")):
+            rules = rules.replace(old, new)
+        rules = rules.replace("output: red_box", "output: link_3").replace("output: blue_box", "output: grip")
+        (tmp_path / f"{name}.yaml").write_text(rules)
+        text = text.replace(f"rules: {name}", f"rules: {name}.yaml")
+    (tmp_path / "scenario.yaml").write_text(text)
+    resolved = resolve(scenario=tmp_path / "scenario.yaml")
+    plant = TwinPlant(arm=resolved.arm, scenario=resolved.scenario, rig=resolved.rig)
+    plant.resetter.reset(seed=3, epoch=0, digital_out=0)
+    named = {thing.name for thing in plant.truth.read().objects}
+    assert {"flange", "base", "base_cap", "link_3", "grip", "finger_left"} < named
