@@ -1,5 +1,6 @@
 """The `autotelic` command: every sub-command is an entry point, imported only when it is called."""
 
+import os
 from collections.abc import Callable
 from importlib.metadata import EntryPoint, entry_points
 from typing import Any
@@ -55,7 +56,13 @@ def _root() -> None:
 
 
 def main() -> None:
-    """Run the command line."""
+    """Run the command line.
+
+    Numerical libraries get one thread unless the environment says otherwise: what runs here is many small sums, and
+    idle worker threads of one process take time from the next.
+    """
+    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+        os.environ.setdefault(name, "1")
     app()
 
 

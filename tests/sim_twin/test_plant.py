@@ -156,13 +156,13 @@ def test_a_stop_comes_to_rest_and_keeps_the_grip(plant):
 def test_things_may_have_the_names_of_the_arms_own_parts_and_of_one_anothers(tmp_path):
     text = (ROOT / "config" / "scenarios" / "paper.yaml").read_text()
     for name, other in (
-        ("orange_button", "flange"), ("green_button", "base"), ("blue_button", "base_cap"), ("red_box", "link_3"),
+        ("orange_button", "flange"), ("green_button", "tcp"), ("blue_button", "tcp_cap"), ("red_box", "link_3"),
         ("blue_box", "grip"), ("red_cylinder", "finger_left"),
     ):  # fmt: skip
         text = text.replace(name, other)
     for name in ("paper_before", "paper_after"):
         rules = (ROOT / "config" / "rules" / f"{name}.yaml").read_text()
-        for old, new in (("green_button", "base"), ("blue_button", "base_cap"), ("orange_button", "flange")):
+        for old, new in (("green_button", "tcp"), ("blue_button", "tcp_cap"), ("orange_button", "flange")):
             rules = rules.replace(old, new)
         rules = rules.replace("output: red_box", "output: link_3").replace("output: blue_box", "output: grip")
         (tmp_path / f"{name}.yaml").write_text(rules)
@@ -172,4 +172,4 @@ def test_things_may_have_the_names_of_the_arms_own_parts_and_of_one_anothers(tmp
     plant = TwinPlant(arm=resolved.arm, scenario=resolved.scenario, rig=resolved.rig)
     plant.resetter.reset(seed=3, epoch=0, digital_out=0)
     named = {thing.name for thing in plant.truth.read().objects}
-    assert {"flange", "base", "base_cap", "link_3", "grip", "finger_left"} < named
+    assert {"flange", "tcp", "tcp_cap", "link_3", "grip", "finger_left"} < named
