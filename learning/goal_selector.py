@@ -25,6 +25,9 @@ from learning.interfaces import Attempt, TrialOutcome
 
 __all__ = ["GoalSelector"]
 
+FAILING = 0.05
+"""Rate of failure taken to be on top of every goal's own, so that no single failure draws all attention."""
+
 
 class GoalSelector:
     """Chooses goals, keeps each goal's record of attempts, and sets the sub-goal selector's temperature by it.
@@ -52,8 +55,10 @@ class GoalSelector:
 
     def probabilities(self) -> np.ndarray:
         """Return each goal's chance of being chosen next.  () -> (n,)"""
-        floor = self._config.probability_floor
-        return (1.0 - floor) * softmax(self._values, self._config.temperature) + floor / len(self._values)
+        floor, by_failure = self._config.probability_floor, self._config.floor_by_failure
+        failing = np.array([FAILING + 1.0 - self.success(goal) for goal in range(len(self._values))])  # (n,)
+        spread = by_failure * failing / failing.sum() + (1.0 - by_failure) / len(failing)
+        return (1.0 - floor) * softmax(self._values, self._config.temperature) + floor * spread
 
     def temperature(self, goal: int) -> float:
         """Return the temperature of the sub-goal choice while pursuing a goal."""

@@ -21,7 +21,7 @@ BEGINNERS_LUCK = 0.15
 """Chance that an expert without one success achieves its goal in a trial where it is allowed."""
 GOOD = 0.5
 """Skill that an expert must have had for its missing the place to say something of what the goal needs."""
-LASTING, LOST = 10, -1
+LASTING, LOST = 50, -1
 """Trials that a goal must have been seen to hold through before it counts as one that does not come and go."""
 LOSS = 0.02
 """Chance that achieving a goal loses another, before it was ever seen."""

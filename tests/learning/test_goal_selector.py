@@ -83,6 +83,16 @@ def test_the_floor_keeps_every_goal_in_sight():
     assert p.sum() == pytest.approx(1.0)
 
 
+def test_a_part_of_the_floor_goes_where_attempts_fail():
+    bandit = selector(window=2, improvement="clipped_success", probability_floor=0.6, floor_by_failure=0.5)
+    for goal, results in enumerate(([1] * 20, [1] * 20, [0] * 20)):
+        feed(bandit, goal, results)
+    p = bandit.probabilities()
+    # Values are all 0, so the free part is even; failing rates are 0.05, 0.05 and 1.05 of 1.15.
+    even, by_failure = 0.4 / 3 + 0.3 / 3, 0.3 * np.array([0.05, 0.05, 1.05]) / 1.15
+    np.testing.assert_allclose(p, even + by_failure, rtol=1e-9)
+
+
 def test_a_starved_goal_is_not_looked_at_without_the_floor_and_is_with_it():
     starving, floored = (selector(window=2, improvement="clipped_success", probability_floor=f) for f in (0.0, 0.3))
     chosen = []

@@ -98,13 +98,13 @@ def test_a_miss_proves_nothing_while_something_holds_that_may_come_and_go():
     g.learn(trial(3))
     g.learn(trial(2, (1,), holds=(1,), holds_after=(2,)))  # 1 was let go
     believed = []
-    for _ in range(14):
+    for _ in range(54):
         before = g.beliefs[3].probabilities.tolist()
         for held in (1, 2):
             g.learn(trial(3, (held,), outcome=NOT_REACHED, holds=(held,), holds_after=(held,)))
         believed.append(g.beliefs[3].probabilities.tolist() == before)
     # 2 is taken for something that lasts only after it was seen to; 1 never again.
-    assert believed == [True] * 9 + [False] * 5
+    assert believed == [True] * 49 + [False] * 5
 
 
 def test_one_strange_success_is_overturned_by_misses_though_nothing_ever_looks_blocked():

@@ -36,7 +36,7 @@ __all__ = [
     "run_experiment",
 ]
 
-TUNING_SEEDS = tuple(range(100, 110))
+TUNING_SEEDS = tuple(range(100, 116))
 """Seeds on which settings were chosen."""
 REPORTING_SEEDS = tuple(range(10))
 """Seeds on which the figures in reports were measured, and that tests run on."""
