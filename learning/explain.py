@@ -4,7 +4,7 @@ import msgspec
 import numpy as np
 
 from learning.graph import Graph
-from learning.preconditions import START, Situation, mask
+from learning.preconditions import START, Kind, Situation, mask
 
 __all__ = ["Explanation", "LiteralBelief", "explain_graph"]
 
@@ -49,7 +49,7 @@ def explain_graph(graph: Graph) -> tuple[Explanation, ...]:
 def _explain(graph: Graph, goal: int) -> Explanation:
     needs, belief = graph.most_probable(goal), graph.beliefs[goal]
     evidence = graph.evidence(goal)
-    agrees = [e.is_achieved == any(needs.allow(reading) for reading in e.readings) for e in evidence]
+    agrees = [(e.kind is Kind.ACHIEVED) == any(needs.allow(reading) for reading in e.readings) for e in evidence]
     return Explanation(
         goal=goal,
         needs_on=_members(needs.on, graph.n_goals),

@@ -10,23 +10,19 @@ import numpy as np
 from config.learning import SubgoalSelection
 from learning.interfaces import Attempt, TrialOutcome
 from learning.planning import Effort, cheapest_plan, relevant_goals
-from learning.preconditions import START, Belief, Evidence, Likelihood, Needs, Situation, mask
+from learning.preconditions import START, Belief, Evidence, Kind, Needs, Situation, mask
 
 __all__ = ["Finding", "Graph"]
 
 LEAST_SKILL = 0.05
 KNOWN = 0.5
 """Least chance of being allowed at a plan's end for it to count as a known way."""
-BEGINNERS_LUCK = 0.15
-"""Chance that an expert without one success achieves its goal in a trial where it is allowed."""
-GOOD = 0.5
-"""Skill that an expert must have had for its missing the place to say something of what the goal needs."""
+REPEATED_BLOCK, REPEATED_MISS = 0.5, 0.3
+"""Weight of a failure that is the same as the one before."""
 LASTING, LOST = 50, -1
 """Trials that a goal must have been seen to hold through before it counts as one that does not come and go."""
 LOSS = 0.02
 """Chance that achieving a goal loses another, before it was ever seen."""
-FORGET = 0.98
-"""How much of an expert's best skill is still believed after each later attempt."""
 N_EVIDENCE = 200
 """Attempts remembered per goal, to be told to a person; nothing is learnt from them twice."""
 N_CARRIED = 20.0
@@ -52,14 +48,16 @@ class Graph:
         self.n_goals = n_goals
         self._config = config
         self.beliefs = tuple(
-            Belief(n_goals=n_goals, goal=g, max_literals=config.max_literals, literal_cost=config.literal_cost)
+            Belief(
+                n_goals=n_goals,
+                goal=g,
+                max_literals=config.max_literals,
+                literal_cost=config.literal_cost,
+                false_positive=config.false_positive,
+            )
             for g in range(n_goals)
         )
         self._skill = [1.0] * n_goals
-        self._came_about = [False] * n_goals
-        """Goals that were achieved at least once."""
-        self._best_skill = [0.0] * n_goals
-        """Of its better days: tried where nothing is to be had, an expert looks unskilled."""
         self._n_lasted = [0] * n_goals
         """Trials through which a goal held; LOST once it was lost: a thing taken can be let go again."""
         self._carried = np.zeros((n_goals, n_goals))
@@ -67,6 +65,7 @@ class Graph:
         """[j, k]: how often goal k held when goal j was achieved, and then held no longer."""
         self._changed_epoch: list[int | None] = [None] * n_goals
         self._log = tuple(deque[Evidence](maxlen=N_EVIDENCE) for _ in range(n_goals))
+        self._last: list[Evidence | None] = [None] * n_goals
 
     # ------------------------------------------------------------------------------------------------------ learn
 
@@ -76,63 +75,43 @@ class Graph:
         if outcome is TrialOutcome.VOID:
             return ()
         self._skill[tried] = attempt.skill
-        self._best_skill[tried] = max(attempt.skill, FORGET * self._best_skill[tried])
         self._note_fleeting(attempt)
         findings: list[Finding] = []
         if outcome is TrialOutcome.ACHIEVED:
             self._count_losses(attempt)
-            findings.append(self._update(tried, attempt, is_achieved=True))
+            findings.append(self._update(tried, attempt, Kind.ACHIEVED))
         elif outcome is TrialOutcome.BLOCKED or not self._config.use_blocked_only:
-            findings.append(self._update(tried, attempt, is_achieved=False))
-        elif not self._came_about[tried]:
-            self._doubt(tried, attempt)
-        elif self._config.miss_weight and self._best_skill[tried] >= GOOD and not self._has_hands_full(attempt):
-            findings.append(self._miss(tried, attempt))
+            findings.append(self._update(tried, attempt, Kind.BLOCKED))
+        elif self._config.miss_weight and not self._has_hands_full(attempt):
+            findings.append(self._update(tried, attempt, Kind.MISSED))
         for i, (was_on, is_on) in enumerate(zip(attempt.state, attempt.state_after, strict=True)):
             if is_on and not was_on and i != tried:
-                findings.append(self._update(i, attempt, is_achieved=True))
+                findings.append(self._update(i, attempt, Kind.ACHIEVED))
         return tuple(findings)
 
-    def _update(self, goal: int, attempt: Attempt, *, is_achieved: bool) -> Finding:
+    def _update(self, goal: int, attempt: Attempt, kind: Kind) -> Finding:
         belief, before = self.beliefs[goal], self.most_probable(goal)
-        self._came_about[goal] |= is_achieved
-        evidence = Evidence(
-            epoch=attempt.epoch, is_achieved=is_achieved, readings=_readings(goal, attempt, is_achieved=is_achieved)
-        )
-        # A second failure in the same epoch and goal-state tells less: whatever was in the way may still be there.
-        is_repeated = not is_achieved and bool(self._log[goal]) and self._log[goal][-1] == evidence
-        belief.mix_with_prior(self._config.hazard)
-        expected = belief.update(evidence, self._likelihood(attempt.skill), weight=0.5 if is_repeated else 1.0)
-        self._log[goal].append(evidence)
+        evidence = Evidence(epoch=attempt.epoch, kind=kind, readings=_readings(goal, attempt, kind))
+        weight = self._weight(evidence, is_repeated=self._last[goal] == evidence)
+        if kind is not Kind.MISSED:
+            belief.mix_with_prior(self._config.hazard)
+            self._log[goal].append(evidence)
+        self._last[goal] = evidence
+        expected = belief.update(evidence, block_hit=self._block_hit(attempt.skill), weight=weight)
         is_revised = self.most_probable(goal) != before
         if is_revised:
             self._changed_epoch[goal] = attempt.epoch
         return Finding(goal=goal, situation=_situation(attempt), expected=expected, is_revised=is_revised)
 
-    def _doubt(self, goal: int, attempt: Attempt) -> None:
-        """Trust a goal-state a little less where a goal that never came about did not come about once more.
+    def _weight(self, evidence: Evidence, *, is_repeated: bool) -> float:
+        """Return how much evidence counts for.
 
-        An expert without one success may be unskilled, or the goal not allowed here: each trial weighs a little, so
-        that a search for the first success does not stay in one goal-state for ever.
+        A second failure in the same epoch and goal-state tells less: whatever was in the way may still be there, and a
+        clumsy expert repeats itself.
         """
-        self.beliefs[goal].update(_failure(goal, attempt), self._luck(BEGINNERS_LUCK))
-
-    def _miss(self, goal: int, attempt: Attempt) -> Finding:
-        """Trust a goal-state less where an expert that has been good did not even reach the place.
-
-        Were its misses no evidence at all, one success for a strange reason (two objects between the jaws) could make
-        the learner try for ever where nothing is to be had and no place is reached.
-        """
-        belief, before = self.beliefs[goal], self.most_probable(goal)
-        p_hit = min(self._best_skill[goal], 1.0 - self._config.blocked_error)
-        expected = belief.update(_failure(goal, attempt), self._luck(p_hit), weight=self._config.miss_weight)
-        is_revised = self.most_probable(goal) != before
-        if is_revised:
-            self._changed_epoch[goal] = attempt.epoch
-        return Finding(goal=goal, situation=_situation(attempt), expected=expected, is_revised=is_revised)
-
-    def _luck(self, p_hit: float) -> Likelihood:
-        return Likelihood(p_hit=p_hit, false_positive=self._config.false_positive)
+        if evidence.kind is Kind.MISSED:
+            return self._config.miss_weight * (REPEATED_MISS if is_repeated else 1.0)
+        return REPEATED_BLOCK if is_repeated and evidence.kind is Kind.BLOCKED else 1.0
 
     def _note_fleeting(self, attempt: Attempt) -> None:
         """Take in which goals held through a trial, and which did not."""
@@ -149,11 +128,10 @@ class Graph:
         holds = mask(attempt.holds or ()) | mask(attempt.holds_after or ())
         return any(holds >> k & 1 and n < LASTING for k, n in enumerate(self._n_lasted))
 
-    def _likelihood(self, skill: float) -> Likelihood:
-        """Return how telling an attempt is. An expert that was at the place fails less often than its skill says."""
+    def _block_hit(self, skill: float) -> float:
+        """Return the chance of success at the place. An expert that came there fails less often than its skill says."""
         least = 0.5 if self._config.use_blocked_only else LEAST_SKILL
-        p_hit = min(max(skill, least), 1.0 - self._config.blocked_error)
-        return Likelihood(p_hit=p_hit, false_positive=self._config.false_positive)
+        return min(max(skill, least), 1.0 - self._config.blocked_error)
 
     def _count_losses(self, attempt: Attempt) -> None:
         """Count which goals held before a goal was achieved, and which of them it lost."""
@@ -237,7 +215,7 @@ class Graph:
     # -------------------------------------------------------------------------------------------------------- tell
 
     def evidence(self, goal: int) -> tuple[Evidence, ...]:
-        """Return the newest evidence about a goal, oldest first."""
+        """Return the newest evidence about a goal, misses left out, oldest first."""
         return tuple(self._log[goal])
 
     def changed_epoch(self, goal: int) -> int | None:
@@ -249,13 +227,12 @@ class Graph:
         return {
             "beliefs": [belief.state_dict() for belief in self.beliefs],
             "skill": list(self._skill),
-            "came_about": list(self._came_about),
-            "best_skill": list(self._best_skill),
             "n_lasted": list(self._n_lasted),
             "carried": self._carried.copy(),
             "lost": self._lost.copy(),
             "changed_epoch": list(self._changed_epoch),
-            "log": [[msgspec.json.decode(msgspec.json.encode(evidence)) for evidence in kept] for kept in self._log],
+            "log": [[_plain(evidence) for evidence in kept] for kept in self._log],
+            "last": [None if evidence is None else _plain(evidence) for evidence in self._last],
         }
 
     def load_state_dict(self, state: dict[str, Any]) -> None:
@@ -263,8 +240,6 @@ class Graph:
         for belief, loaded in zip(self.beliefs, state["beliefs"], strict=True):
             belief.load_state_dict(loaded)
         self._skill = list(state["skill"])
-        self._came_about = list(state["came_about"])
-        self._best_skill = list(state["best_skill"])
         self._n_lasted = list(state["n_lasted"])
         self._carried = np.array(state["carried"], dtype=float)
         self._lost = np.array(state["lost"], dtype=float)
@@ -272,6 +247,11 @@ class Graph:
         for kept, loaded in zip(self._log, state["log"], strict=True):
             kept.clear()
             kept.extend(msgspec.convert(loaded, list[Evidence]))
+        self._last = msgspec.convert(state["last"], list[Evidence | None])
+
+
+def _plain(evidence: Evidence) -> Any:  # noqa: ANN401 - a JSON tree
+    return msgspec.json.decode(msgspec.json.encode(evidence))
 
 
 def _situation(attempt: Attempt) -> Situation:
@@ -279,11 +259,7 @@ def _situation(attempt: Attempt) -> Situation:
     return Situation(latched if attempt.holds is None else latched & mask(attempt.holds), latched)
 
 
-def _failure(goal: int, attempt: Attempt) -> Evidence:
-    return Evidence(epoch=attempt.epoch, is_achieved=False, readings=_readings(goal, attempt, is_achieved=False))
-
-
-def _readings(goal: int, attempt: Attempt, *, is_achieved: bool) -> tuple[Situation, ...]:
+def _readings(goal: int, attempt: Attempt, kind: Kind) -> tuple[Situation, ...]:
     """Return the situations that may have been in force when a goal came about, or did not.
 
     Where other goals came about in the same trial the order is unknown: before them, or after. Where a latched goal
@@ -293,7 +269,7 @@ def _readings(goal: int, attempt: Attempt, *, is_achieved: bool) -> tuple[Situat
     before = mask(attempt.state)
     after = before | mask(attempt.state_after) & ~(1 << goal)
     lost = before & ~_situation(attempt).holds
-    if attempt.holds_after is not None and not is_achieved:
+    if attempt.holds_after is not None and kind is not Kind.ACHIEVED:
         lost |= before & ~mask(attempt.holds_after)
     readings = {Situation(latched & ~gone, latched) for latched in (before, after) for gone in (0, lost)}
     return tuple(sorted(readings))

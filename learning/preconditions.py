@@ -4,13 +4,14 @@ A literal says of another goal that it must be on, or must be off. Sets of goals
 """
 
 from collections.abc import Iterator, Sequence
+from enum import StrEnum
 from itertools import combinations, product
 from typing import Any, NamedTuple
 
 import msgspec
 import numpy as np
 
-__all__ = ["START", "Belief", "Evidence", "Likelihood", "Needs", "Situation", "conjunctions", "mask"]
+__all__ = ["START", "Belief", "Evidence", "Kind", "Needs", "Situation", "conjunctions", "mask"]
 
 
 class Situation(NamedTuple):
@@ -40,20 +41,25 @@ class Needs(NamedTuple):
         return not self.on & ~situation.holds and not self.off & situation.latched
 
 
-class Likelihood(msgspec.Struct, frozen=True, kw_only=True):
-    """How surely an attempt's result tells whether the goal was allowed."""
+FORGET = 0.95
+"""How much of the record of hits and misses is left after each later attempt: a skill grows, or is lost."""
 
-    p_hit: float
-    """Chance that an attempt succeeds where the goal is allowed."""
-    false_positive: float
-    """Chance that it succeeds where the goal is not allowed."""
+
+class Kind(StrEnum):
+    """How an attempt ended."""
+
+    ACHIEVED = "achieved"
+    BLOCKED = "blocked"
+    """At the place, to no effect."""
+    MISSED = "missed"
+    """The place was not reached: for want of skill, or because there was nothing to be had."""
 
 
 class Evidence(msgspec.Struct, frozen=True, kw_only=True):
     """One attempt as far as preconditions go."""
 
     epoch: int
-    is_achieved: bool
+    kind: Kind
     readings: tuple[Situation, ...]
     """Situations that may have been in force; more than one where what happened can be read in several ways."""
 
@@ -78,9 +84,15 @@ class Belief:
 
     The prior of a conjunction is exp(-cost · literals), normalised. Before each update the posterior is mixed with the
     prior at the hazard: so often the needs are taken to have been drawn anew since the last attempt.
+
+    An attempt fails for want of skill or for want of what is needed, and only together do they explain a record. So
+    each conjunction has a skill of its own: the share of hits, Beta(1, 1) and forgetting, where it allowed the goal. If
+    every miss fell where a conjunction says no, that one needs no clumsy expert to explain them, and gains.
     """
 
-    def __init__(self, *, n_goals: int, goal: int, max_literals: int, literal_cost: float) -> None:
+    def __init__(
+        self, *, n_goals: int, goal: int, max_literals: int, literal_cost: float, false_positive: float
+    ) -> None:
         needs = tuple(conjunctions(n_goals, goal, max_literals))
         self._on = np.array([c.on for c in needs], dtype=np.int64)  # (h,)
         self._off = np.array([c.off for c in needs], dtype=np.int64)  # (h,)
@@ -88,6 +100,9 @@ class Belief:
         weights = np.exp(-literal_cost * n_literals)
         self._prior = weights / weights.sum()
         self._n_goals = n_goals
+        self._false_positive = false_positive
+        self._hits = np.zeros(len(needs))  # (h,)
+        self._misses = np.zeros(len(needs))  # (h,)
         self._believe(self._prior.copy())
 
     def allows(self, situation: Situation) -> np.ndarray:
@@ -107,7 +122,7 @@ class Belief:
         """Take the needs to have been drawn anew with this chance."""
         self._believe((1.0 - hazard) * self.probabilities + hazard * self._prior)
 
-    def update(self, evidence: Evidence, likelihood: Likelihood, *, weight: float = 1.0) -> float:
+    def update(self, evidence: Evidence, *, block_hit: float, weight: float = 1.0) -> float:
         """Apply Bayes' rule to one attempt and return the chance that had been given to its result.
 
         Where the situation can be read in more than one way, success is likely if any reading allows the goal (the
@@ -115,19 +130,34 @@ class Belief:
 
         Args:
             evidence: the attempt.
-            likelihood: how telling it is.
+            block_hit: chance that an attempt which came to the place succeeds where the goal is allowed.
             weight: power that the likelihood is raised to; below 1 for evidence that is not independent.
         """
         allowed = np.stack([self.allows(situation) for situation in evidence.readings])  # (readings, h)
-        p_hit, fp = likelihood.p_hit, likelihood.false_positive
-        if evidence.is_achieved:
-            factors = np.where(allowed.any(axis=0), p_hit, fp)
-        else:
-            factors = np.where(allowed, 1.0 - p_hit, 1.0 - fp).mean(axis=0)
+        fp, chance = self._false_positive, (self._hits + 1.0) / (self._hits + self._misses + 2.0)  # (), (h,)
+        match evidence.kind:
+            case Kind.ACHIEVED:
+                factors = np.where(allowed.any(axis=0), np.maximum(chance, fp), fp)
+            case Kind.BLOCKED:
+                factors = np.where(allowed, 1.0 - block_hit, 1.0 - fp).mean(axis=0)
+            case Kind.MISSED:
+                factors = np.where(allowed, 1.0 - chance, 1.0 - fp).mean(axis=0)
         expected = float(self.probabilities @ factors)
         posterior = self.probabilities * factors**weight
         self._believe(posterior / posterior.sum())
+        self._record(evidence.kind, allowed, weight)
         return expected
+
+    def _record(self, kind: Kind, allowed: np.ndarray, weight: float) -> None:
+        """Count a hit or a miss for every conjunction that allowed the goal. A block says nothing of the skill."""
+        if kind is Kind.BLOCKED:
+            return
+        counted = allowed.any(axis=0) * (1.0 if kind is Kind.ACHIEVED else weight)  # (h,)
+        is_counted = counted > 0.0
+        for record, is_this in ((self._hits, kind is Kind.ACHIEVED), (self._misses, kind is Kind.MISSED)):
+            record[is_counted] *= FORGET
+            if is_this:
+                record += counted
 
     def sample(self, rng: np.random.Generator) -> Needs:
         """Draw a conjunction from the posterior."""
@@ -150,9 +180,12 @@ class Belief:
         return Needs(int(self._on[index]), int(self._off[index]))
 
     def state_dict(self) -> dict[str, Any]:
-        """Return the posterior."""
-        return {"probabilities": self.probabilities.copy()}
+        """Return the posterior and the record."""
+        return {
+            "probabilities": self.probabilities.copy(), "hits": self._hits.copy(), "misses": self._misses.copy(),
+        }  # fmt: skip
 
     def load_state_dict(self, state: dict[str, Any]) -> None:
         """Restore bit for bit."""
         self._believe(np.array(state["probabilities"], dtype=float))
+        self._hits, self._misses = np.array(state["hits"], dtype=float), np.array(state["misses"], dtype=float)

@@ -5,13 +5,15 @@ import math
 import numpy as np
 import pytest
 
-from learning.preconditions import START, Belief, Evidence, Likelihood, Needs, Situation, conjunctions, mask
+from learning.preconditions import START, Belief, Evidence, Kind, Needs, Situation, conjunctions, mask
 
-SURE = Likelihood(p_hit=0.95, false_positive=0.02)
+ACHIEVED, BLOCKED, MISSED = Kind.ACHIEVED, Kind.BLOCKED, Kind.MISSED
+SURE = 0.95
+"""Chance of success at the place."""
 
 
 def belief(n_goals=3, goal=2, max_literals=2, literal_cost=1.2):
-    return Belief(n_goals=n_goals, goal=goal, max_literals=max_literals, literal_cost=literal_cost)
+    return Belief(n_goals=n_goals, goal=goal, max_literals=max_literals, literal_cost=literal_cost, false_positive=0.02)
 
 
 def state(*goals):
@@ -19,8 +21,8 @@ def state(*goals):
     return Situation(bits, bits)
 
 
-def seen(is_achieved, *readings):
-    return Evidence(epoch=0, is_achieved=is_achieved, readings=readings)
+def seen(kind, *readings):
+    return Evidence(epoch=0, kind=kind, readings=readings)
 
 
 @pytest.mark.parametrize(
@@ -45,7 +47,7 @@ def test_the_prior_falls_by_the_cost_with_each_literal():
 def test_bayes_rule_by_hand():
     # Two goals: hypotheses {}, {0 on}, {0 off}. Blocked with nothing on: {} and {0 off} had predicted success.
     b = belief(n_goals=2, goal=1, max_literals=1, literal_cost=0.0)
-    expected = b.update(seen(False, START), SURE)
+    expected = b.update(seen(BLOCKED, START), block_hit=SURE)
     weights = {Needs(0, 0): 0.05, Needs(1, 0): 0.98, Needs(0, 1): 0.05}
     assert expected == pytest.approx(sum(weights.values()) / 3)
     assert b.confidence == pytest.approx(0.98 / 1.08)
@@ -56,21 +58,46 @@ def test_bayes_rule_by_hand():
 
 def test_evidence_of_half_weight_moves_half_as_far_in_odds():
     whole, half = (belief(n_goals=2, goal=1, max_literals=1, literal_cost=0.0) for _ in range(2))
-    whole.update(seen(False, START), SURE)
+    whole.update(seen(BLOCKED, START), block_hit=SURE)
     for _ in range(2):
-        half.update(seen(False, START), SURE, weight=0.5)
+        half.update(seen(BLOCKED, START), block_hit=SURE, weight=0.5)
     assert half.probabilities == pytest.approx(whole.probabilities)
 
 
 def test_a_failure_in_a_situation_of_two_readings_is_averaged_and_a_success_needs_only_one():
     ambiguous = (START, state(0))
     failed = belief(n_goals=2, goal=1, max_literals=1, literal_cost=0.0)
-    failed.update(seen(False, *ambiguous), SURE)
+    failed.update(seen(BLOCKED, *ambiguous), block_hit=SURE)
     # {} is allowed in both readings (0.05), the literals in one of them: (0.05 + 0.98) / 2.
     assert failed.confidence == pytest.approx(0.515 / (0.05 + 2 * 0.515))
     achieved = belief(n_goals=2, goal=1, max_literals=1, literal_cost=0.0)
-    achieved.update(seen(True, *ambiguous), SURE)
+    achieved.update(seen(ACHIEVED, *ambiguous), block_hit=SURE)
     assert achieved.probabilities == pytest.approx([1 / 3] * 3)
+
+
+def test_every_conjunction_has_a_skill_of_its_own():
+    # Hypotheses {}, {0 on}, {0 off}. A hit with 0 on, then two misses with nothing on.
+    b = belief(n_goals=2, goal=1, max_literals=1, literal_cost=0.0)
+    b.update(seen(ACHIEVED, state(0)), block_hit=SURE)
+    # Nothing is known of any skill yet: 1/2 where the goal was allowed, else a false positive.
+    assert b.probabilities == pytest.approx(np.array([0.5, 0.5, 0.02]) / 1.02)
+    b.update(seen(MISSED, START), block_hit=SURE)
+    # {} has one hit in one trial, Beta(1, 1): 2/3; {0 off} none: 1/2; {0 on} needs no clumsy expert.
+    weights = np.array([0.5 * (1 - 2 / 3), 0.5 * 0.98, 0.02 * 0.5])
+    assert b.probabilities == pytest.approx(weights / weights.sum())
+    b.update(seen(MISSED, START), block_hit=SURE)
+    hits, misses = 0.95, 1.0
+    weights *= np.array([1 - (hits + 1) / (hits + misses + 2), 0.98, 1 - 1 / 3])
+    assert b.probabilities == pytest.approx(weights / weights.sum())
+
+
+def test_an_expert_that_misses_everywhere_says_nothing_about_needs():
+    b = belief(n_goals=2, goal=1, max_literals=1)
+    before = b.probabilities.copy()
+    for k in range(40):
+        b.update(seen(MISSED, START if k % 2 else state(0)), block_hit=SURE)
+    assert abs(b.probabilities - before).max() < 0.3
+    assert b.predict_allowed(START) + b.predict_allowed(state(0)) > 1.0
 
 
 def test_what_was_dropped_does_not_hold_but_is_latched():
@@ -92,7 +119,7 @@ def test_vector_and_scalar_judgement_agree():
 def test_the_hazard_mixes_with_the_prior():
     b = belief()
     prior = b.probabilities.copy()
-    b.update(seen(True, state(0)), SURE)
+    b.update(seen(ACHIEVED, state(0)), block_hit=SURE)
     sharp = b.probabilities.copy()
     b.mix_with_prior(0.25)
     assert b.probabilities == pytest.approx(0.75 * sharp + 0.25 * prior)
@@ -100,7 +127,7 @@ def test_the_hazard_mixes_with_the_prior():
 
 def test_draws_follow_the_posterior():
     b = belief(n_goals=2, goal=1, max_literals=1, literal_cost=0.0)
-    b.update(seen(False, START), SURE)
+    b.update(seen(BLOCKED, START), block_hit=SURE)
     rng = np.random.default_rng(0)
     share = sum(b.sample(rng) == Needs(1, 0) for _ in range(3000)) / 3000
     assert share == pytest.approx(0.98 / 1.08, abs=0.02)
@@ -110,7 +137,7 @@ def test_a_belief_survives_ten_thousand_contrary_surprises_without_losing_its_su
     b = belief()
     for i in range(10_000):
         b.mix_with_prior(0.0)
-        b.update(seen(i % 2 == 0, START), SURE)
+        b.update(seen(ACHIEVED if i % 2 else BLOCKED, START), block_hit=SURE)
     assert np.isfinite(b.probabilities).all()
     assert b.probabilities.sum() == pytest.approx(1.0)
 

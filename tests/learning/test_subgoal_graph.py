@@ -77,14 +77,6 @@ def test_a_trial_that_did_not_reach_the_place_tells_less_than_a_blocked_one():
     assert said[BLOCKED] < said[NOT_REACHED] < 1.0
 
 
-def test_the_misses_of_an_expert_that_was_never_good_tell_nothing():
-    g = graph()
-    g.learn(trial(3, skill=0.4))
-    before = g.beliefs[3].probabilities.copy()
-    g.learn(trial(3, outcome=NOT_REACHED, skill=0.4))
-    assert g.beliefs[3].probabilities.tolist() == before.tolist()
-
-
 def test_misses_are_no_evidence_at_a_weight_of_nothing():
     g = graph(miss_weight=0.0)
     g.learn(trial(3))
