@@ -9,16 +9,12 @@ from config.arm import ArmConfig
 from config.rig import Rig
 from config.rules import RuleSet
 from config.scenario import Scenario
-from robot.cell import Cell
-from robot.errors import RobotConfigError, WireError
+from robot.errors import RobotConfigError
 from robot.hal.protocols import Plant
-from robot.kinematics import ToolChain
 from robot.messages import (
-    ArmCommand,
     ArmState,
     Executed,
-    GripCommand,
-    Hold,
+    Grip,
     Intent,
     Percept,
     PlantIdentity,
@@ -26,16 +22,15 @@ from robot.messages import (
     StationSpec,
     StationState,
     StepResult,
-    Verdict,
 )
-from robot.motion import HandReflexes, Mover
-from robot.safety import Arming, Gate, GateLimits, Reason
+from robot.motion import HandReflexes
+from robot.safety import Arming
+from robot.tick_loop import Stride, TickLoop
 
 __all__ = ["LocalStation", "Perceives"]
 
 WHOLE_TICKS = 1e-6
 MAX_STEP_S = 10.0
-_HOLD = Hold()
 
 
 class Perceives(Protocol):
@@ -70,11 +65,8 @@ class LocalStation:
             )
         table_m = scenario.table.height_m
         self._plant, self._perception, self._rig = plant, perception, rig
-        self._cell = Cell(scenario=scenario, rule_sets=rule_sets, arm=arm)
-        self._mover = Mover(arm, table_m=table_m, tick_s=rig.tick_s)
+        self._loop = TickLoop(arm=plant.arm, config=arm, scenario=scenario, rule_sets=rule_sets, rig=rig)
         self._reflexes = HandReflexes(arm=arm, scenario=scenario)
-        limits = GateLimits.of(arm, plant.arm.spec, table_m=table_m, tick_s=rig.tick_s)
-        self._gate = Gate(arm=plant.arm, limits=limits, chain=ToolChain(arm))
         self._arming = Arming(expected=rig.expected, max_latches=rig.max_latches)
         self._spec = StationSpec(
             n_distances=len(scenario.distances),
@@ -86,8 +78,6 @@ class LocalStation:
             workspace_m=arm.motion.workspace_m,
             table_height_m=table_m,
         )
-        self._tick_ns = round(rig.tick_s * 1e9)
-        self._state: ArmState
         self._percept: Percept
         self._is_connected = False
 
@@ -138,7 +128,7 @@ class LocalStation:
 
     def reset_plant(self, *, seed: int, epoch: int) -> None:
         """Lay the table out in any mode. Clears no latch. For an operator."""
-        digital_out = self._cell.begin_epoch(epoch)
+        digital_out = self._loop.begin_epoch(epoch)
         self._plant.resetter.reset(seed=seed, epoch=epoch, digital_out=digital_out)
         self._arming.note_plant_reset()
 
@@ -166,23 +156,11 @@ class LocalStation:
         self._arming.require_engaged()
         duration = self._spec.step_s if duration_s is None else duration_s
         n_ticks = self._whole_ticks(duration)
-        before = self._state
-        verdict = self._gate.admit(intent, now_ns=self._plant.arm.clock.now_ns())
-        if verdict is not None:
-            self._latch(verdict)
-            return self._result(before, 0.0, (verdict,))
-        grip = self._reflexes.decide(self._percept, intent.grip)
-        if self._reflexes.is_busy:
-            self._mover.begin_step(_HOLD, before, duration_s=duration)
-            self._mover.hold("hand")
-        else:
-            self._mover.begin_step(intent, before, duration_s=duration)
-        for _ in range(n_ticks):
-            verdict = self._tick(grip)
-            if verdict is not None:
-                self._latch(verdict)
-                return self._result(before, duration, (verdict,))
-        return self._result(before, duration, ())
+        grip = self._reflexes.decide(self._percept, _grip_of(intent))
+        stride = self._loop.stride(intent, grip, n_ticks=n_ticks, is_hand_busy=self._reflexes.is_busy)
+        if stride.verdict is not None:
+            self._arming.latch(f"{stride.verdict.reason}: {stride.verdict.detail}")
+        return self._result(stride, duration if stride.is_begun else 0.0)
 
     def close(self) -> None:
         """Stop and release. Idempotent, never raises."""
@@ -192,38 +170,9 @@ class LocalStation:
             self._is_connected = False
         self._arming.disarm()
 
-    def _tick(self, grip: GripCommand) -> Verdict | None:
-        """One tick of the loop. Returns the gate's refusal, if it refused."""
-        arm, gate = self._plant.arm, self._gate
-        now_ns = arm.clock.now_ns()
-        try:
-            state = self._read(now_ns)
-            command = ArmCommand(
-                stamp_ns=now_ns,
-                sequence=gate.next_sequence,
-                q_rad=self._mover.tick(state),
-                grip=grip,
-                digital_out=self._cell.tick(state),
-            )
-            verdict = gate.write(command, state, now_ns=now_ns)
-            if verdict is None:
-                arm.clock.wait_tick()
-                self._state = arm.read()
-        except WireError as error:
-            return gate.latch(Reason.STALE_STATE, str(error), now_ns=now_ns)
-        return verdict
-
-    def _read(self, now_ns: int) -> ArmState:
-        """Return the newest state; in lock-step the last one still is."""
-        if now_ns - self._state.stamp_ns >= self._tick_ns:
-            self._state = self._plant.arm.read()
-        return self._state
-
     def _seed(self) -> Percept:
         """Start everything from the measured state."""
-        state = self._state = self._plant.arm.read()
-        self._gate.seed(state)
-        self._mover.seed(state)
+        state = self._loop.seed()
         percept = self._perceive(state)
         self._reflexes.reset(percept)
         return percept
@@ -231,30 +180,26 @@ class LocalStation:
     def _perceive(self, state: ArmState) -> Percept:
         truth = self._plant.truth
         percept = self._perception.perceive(state, None if truth is None else truth.read())
-        if self._mover.is_in_contact:
+        if self._loop.is_in_contact:
             percept = msgspec.structs.replace(percept, is_in_contact=True)
         self._percept = percept
         return percept
 
-    def _result(self, before: ArmState, duration_s: float, verdicts: tuple[Verdict, ...]) -> StepResult:
-        after, mover = self._state, self._mover
-        (x0, y0, z0), (x1, y1, z1) = before.tcp_position_m, after.tcp_position_m
-        limiters = mover.limiters
+    def _result(self, stride: Stride, duration_s: float) -> StepResult:
+        (x0, y0, z0), (x1, y1, z1) = stride.before.tcp_position_m, stride.after.tcp_position_m
         is_lost = self._reflexes.lost_object
+        verdicts = () if stride.verdict is None else (stride.verdict,)
         return StepResult(
-            percept=self._perceive(after),
+            percept=self._perceive(stride.after),
             executed=Executed(
                 duration_s=duration_s,
                 moved_m=(x1 - x0, y1 - y0, z1 - z0),
-                target_m=mover.target_m,
-                limiters=(*limiters, "object_lost") if is_lost else limiters,
+                target_m=stride.target_m,
+                limiters=(*stride.limiters, "object_lost") if is_lost else stride.limiters,
             ),
             verdicts=verdicts,
             is_void=is_lost or bool(verdicts),
         )
-
-    def _latch(self, verdict: Verdict) -> None:
-        self._arming.latch(f"{verdict.reason}: {verdict.detail}")
 
     def _whole_ticks(self, duration_s: float) -> int:
         n = round(duration_s / self._rig.tick_s) if 0.0 < duration_s <= MAX_STEP_S else 0
@@ -262,3 +207,9 @@ class LocalStation:
             expected = f"whole ticks of {self._rig.tick_s} s up to {MAX_STEP_S} s"
             raise RobotConfigError(f"duration_s: expected {expected}, came {duration_s}")
         return n
+
+
+def _grip_of(intent: object) -> Grip | None:
+    """Return what an intent asks of the hand; of what is no intent, nothing: the gate will refuse it."""
+    grip = getattr(intent, "grip", None)
+    return grip if isinstance(grip, Grip) else None

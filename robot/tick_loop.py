@@ -1,0 +1,138 @@
+"""What runs each tick of an arm: read, cell, motion, gate, wait. Knows nothing of percepts, reflexes or arming."""
+
+import msgspec
+
+from config.arm import ArmConfig
+from config.rig import Rig
+from config.rules import RuleSet
+from config.scenario import Scenario
+from robot.cell import Cell
+from robot.errors import WireError
+from robot.hal.protocols import Arm
+from robot.kinematics import ToolChain
+from robot.messages import ArmCommand, ArmState, GripCommand, Hold, Intent, Vec3, Verdict
+from robot.motion import Mover
+from robot.safety import Gate, GateLimits, Reason
+
+__all__ = ["Stride", "TickLoop"]
+
+_HOLD = Hold()
+
+
+class Stride(msgspec.Struct, frozen=True, kw_only=True):
+    """What one time step of the loop came to."""
+
+    before: ArmState
+    after: ArmState
+    is_begun: bool
+    """The gate admitted the intent; otherwise no time has passed."""
+    target_m: Vec3
+    """Where the tool centre point will rest if nothing more is asked."""
+    limiters: tuple[str, ...]
+    is_in_contact: bool
+    verdict: Verdict | None = None
+    """The gate's refusal, if it refused."""
+
+
+class TickLoop:
+    """One arm's motion, cell and gate. After a refusal it must be seeded again before anything moves.
+
+    Attributes:
+        state: The newest measurement.
+    """
+
+    def __init__(
+        self, *, arm: Arm, config: ArmConfig, scenario: Scenario, rule_sets: tuple[RuleSet, ...], rig: Rig
+    ) -> None:
+        """Put the parts together; the arm is not connected to.
+
+        Args:
+            arm: what is driven.
+            config: the arm's file.
+            scenario: the table.
+            rule_sets: one for each span of the scenario's schedule.
+            rig: how long a tick is.
+        """
+        table_m = scenario.table.height_m
+        self._arm = arm
+        self._cell = Cell(scenario=scenario, rule_sets=rule_sets, arm=config)
+        self._mover = Mover(config, table_m=table_m, tick_s=rig.tick_s)
+        limits = GateLimits.of(config, arm.spec, table_m=table_m, tick_s=rig.tick_s)
+        self._gate = Gate(arm=arm, limits=limits, chain=ToolChain(config))
+        self._tick_s, self._tick_ns = rig.tick_s, round(rig.tick_s * 1e9)
+        self.state: ArmState
+
+    @property
+    def is_in_contact(self) -> bool:
+        """Whether something holds the tool up."""
+        return self._mover.is_in_contact
+
+    def begin_epoch(self, epoch: int) -> int:
+        """Take up the rules of an epoch, latched inputs cleared, and return the outputs it begins with."""
+        return self._cell.begin_epoch(epoch)
+
+    def seed(self) -> ArmState:
+        """Start everything from the measured state, and return it."""
+        state = self.state = self._arm.read()
+        self._gate.seed(state)
+        self._mover.seed(state)
+        return state
+
+    def stride(self, intent: Intent, grip: GripCommand, *, n_ticks: int, is_hand_busy: bool) -> Stride:
+        """Carry out an intent for so many ticks.
+
+        Args:
+            intent: what to do, if the gate admits it.
+            grip: what the hand does meanwhile.
+            n_ticks: how long.
+            is_hand_busy: the arm waits for the hand.
+        """
+        before = self.state
+        verdict = self._gate.admit(intent, now_ns=self._arm.clock.now_ns())
+        if verdict is not None:
+            return self._tell(before, verdict, is_begun=False)
+        duration_s = n_ticks * self._tick_s
+        if is_hand_busy:
+            self._mover.begin_step(_HOLD, before, duration_s=duration_s)
+            self._mover.hold("hand")
+        else:
+            self._mover.begin_step(intent, before, duration_s=duration_s)
+        for _ in range(n_ticks):
+            verdict = self.tick(grip)
+            if verdict is not None:
+                break
+        return self._tell(before, verdict, is_begun=True)
+
+    def tick(self, grip: GripCommand) -> Verdict | None:
+        """Run one tick and return the gate's refusal, if it refused."""
+        arm, gate = self._arm, self._gate
+        now_ns = arm.clock.now_ns()
+        try:
+            state = self._read(now_ns)
+            command = ArmCommand(
+                stamp_ns=now_ns,
+                sequence=gate.next_sequence,
+                q_rad=self._mover.tick(state),
+                grip=grip,
+                digital_out=self._cell.tick(state),
+            )
+            verdict = gate.write(command, state, now_ns=now_ns)
+            if verdict is None:
+                arm.clock.wait_tick()
+                self.state = arm.read()
+        except WireError as error:
+            return gate.latch(Reason.STALE_STATE, str(error), now_ns=now_ns)
+        return verdict
+
+    def _read(self, now_ns: int) -> ArmState:
+        """Return the newest state; in lock-step the last one still is."""
+        if now_ns - self.state.stamp_ns >= self._tick_ns:
+            self.state = self._arm.read()
+        return self.state
+
+    def _tell(self, before: ArmState, verdict: Verdict | None, *, is_begun: bool) -> Stride:
+        mover = self._mover
+        return Stride(
+            before=before, after=self.state, is_begun=is_begun, target_m=mover.target_m, limiters=mover.limiters,
+            is_in_contact=mover.is_in_contact, verdict=verdict,
+        )  # fmt: skip
