@@ -19,8 +19,6 @@ KNOWN = 0.5
 """Least chance of being allowed at a plan's end for it to count as a known way."""
 REPEATED_BLOCK, REPEATED_MISS = 0.5, 0.3
 """Weight of a failure that is the same as the one before."""
-LASTING, LOST = 50, -1
-"""Trials that a goal must have been seen to hold through before it counts as one that does not come and go."""
 LOSS = 0.02
 """Chance that achieving a goal loses another, before it was ever seen."""
 N_EVIDENCE = 200
@@ -58,8 +56,6 @@ class Graph:
             for g in range(n_goals)
         )
         self._skill = [1.0] * n_goals
-        self._n_lasted = [0] * n_goals
-        """Trials through which a goal held; LOST once it was lost: a thing taken can be let go again."""
         self._carried = np.zeros((n_goals, n_goals))
         self._lost = np.zeros((n_goals, n_goals))
         """[j, k]: how often goal k held when goal j was achieved, and then held no longer."""
@@ -75,14 +71,13 @@ class Graph:
         if outcome is TrialOutcome.VOID:
             return ()
         self._skill[tried] = attempt.skill
-        self._note_fleeting(attempt)
         findings: list[Finding] = []
         if outcome is TrialOutcome.ACHIEVED:
             self._count_losses(attempt)
             findings.append(self._update(tried, attempt, Kind.ACHIEVED))
         elif outcome is TrialOutcome.BLOCKED or not self._config.use_blocked_only:
             findings.append(self._update(tried, attempt, Kind.BLOCKED))
-        elif self._config.miss_weight and not self._has_hands_full(attempt):
+        elif self._config.miss_weight:
             findings.append(self._update(tried, attempt, Kind.MISSED))
         for i, (was_on, is_on) in enumerate(zip(attempt.state, attempt.state_after, strict=True)):
             if is_on and not was_on and i != tried:
@@ -112,21 +107,6 @@ class Graph:
         if evidence.kind is Kind.MISSED:
             return self._config.miss_weight * (REPEATED_MISS if is_repeated else 1.0)
         return REPEATED_BLOCK if is_repeated and evidence.kind is Kind.BLOCKED else 1.0
-
-    def _note_fleeting(self, attempt: Attempt) -> None:
-        """Take in which goals held through a trial, and which did not."""
-        if attempt.holds is None or attempt.holds_after is None:
-            return
-        for k, (held, holds) in enumerate(zip(attempt.holds, attempt.holds_after, strict=True)):
-            if held and not holds:
-                self._n_lasted[k] = LOST
-            elif held and self._n_lasted[k] != LOST:
-                self._n_lasted[k] += 1
-
-    def _has_hands_full(self, attempt: Attempt) -> bool:
-        """Whether something held before or after the trial that may come and go: a full hand takes nothing else."""
-        holds = mask(attempt.holds or ()) | mask(attempt.holds_after or ())
-        return any(holds >> k & 1 and n < LASTING for k, n in enumerate(self._n_lasted))
 
     def _block_hit(self, skill: float) -> float:
         """Return the chance of success at the place. An expert that came there fails less often than its skill says."""
@@ -227,7 +207,6 @@ class Graph:
         return {
             "beliefs": [belief.state_dict() for belief in self.beliefs],
             "skill": list(self._skill),
-            "n_lasted": list(self._n_lasted),
             "carried": self._carried.copy(),
             "lost": self._lost.copy(),
             "changed_epoch": list(self._changed_epoch),
@@ -240,7 +219,6 @@ class Graph:
         for belief, loaded in zip(self.beliefs, state["beliefs"], strict=True):
             belief.load_state_dict(loaded)
         self._skill = list(state["skill"])
-        self._n_lasted = list(state["n_lasted"])
         self._carried = np.array(state["carried"], dtype=float)
         self._lost = np.array(state["lost"], dtype=float)
         self._changed_epoch = list(state["changed_epoch"])

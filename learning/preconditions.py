@@ -88,6 +88,10 @@ class Belief:
     An attempt fails for want of skill or for want of what is needed, and only together do they explain a record. So
     each conjunction has a skill of its own: the share of hits, Beta(1, 1) and forgetting, where it allowed the goal. If
     every miss fell where a conjunction says no, that one needs no clumsy expert to explain them, and gains.
+
+    A miss speaks only for what must be on: without the thing that is to be put somewhere there may be no way to the
+    place. What must be off shows itself at the place, where the attempt is blocked; misses with something else in the
+    way, such as a full hand, would be taken for it.
     """
 
     def __init__(
@@ -108,6 +112,10 @@ class Belief:
     def allows(self, situation: Situation) -> np.ndarray:
         """Return which conjunctions allow the goal in a situation.  () -> (h,)"""
         return ((self._on & ~situation.holds) | (self._off & situation.latched)) == 0
+
+    def _provides(self, situation: Situation) -> np.ndarray:
+        """Return in which conjunctions all that must be on is on.  () -> (h,)"""
+        return (self._on & ~situation.holds) == 0
 
     def _believe(self, probabilities: np.ndarray) -> None:
         self.probabilities = probabilities
@@ -133,7 +141,8 @@ class Belief:
             block_hit: chance that an attempt which came to the place succeeds where the goal is allowed.
             weight: power that the likelihood is raised to; below 1 for evidence that is not independent.
         """
-        allowed = np.stack([self.allows(situation) for situation in evidence.readings])  # (readings, h)
+        permits = self._provides if evidence.kind is Kind.MISSED else self.allows
+        allowed = np.stack([permits(situation) for situation in evidence.readings])  # (readings, h)
         fp, chance = self._false_positive, (self._hits + 1.0) / (self._hits + self._misses + 2.0)  # (), (h,)
         match evidence.kind:
             case Kind.ACHIEVED:
