@@ -52,9 +52,10 @@ def test_the_papers_rules_are_learnt_and_their_change_recovered_from(default, se
     assert max(result.over_optimum) <= 0.3  # 0.09 of it is the skill of 0.95
 
 
-def test_the_graph_is_right_within_sixty_epochs_of_the_switch(default):
-    right = [run(default, seed).right_after for seed in FEW]
-    assert sum(epoch is not None and epoch <= 60 for epoch in right) >= len(FEW) - 1
+def test_the_graph_is_right_for_good_within_sixty_epochs_of_the_switch_for_most():
+    default = load_learning("default")
+    right = [run(default, seed).right_after for seed in REPORTING_SEEDS]
+    assert np.median([np.inf if epoch is None else epoch for epoch in right]) <= 60
 
 
 @pytest.mark.parametrize("seed", FEW[:2])
