@@ -30,7 +30,7 @@ _PLACE = struct.Struct(">2i")
 
 
 class Source(IntEnum):
-    """Which part of the controller speaks; a signed byte on the wire. Joints and safety boards have larger numbers of their own."""
+    """Which part of the controller speaks; a signed byte on the wire. Joints and boards have numbers of their own."""
 
     UNDEFINED = -1
     ROBOT_INTERFACE = -2
@@ -49,6 +49,7 @@ class ReportLevel(IntEnum):
     WARNING = 2
     VIOLATION = 3
     FAULT = 4
+    CRITICAL_FAULT = 5
 
 
 class _Type(IntEnum):
