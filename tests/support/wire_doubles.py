@@ -19,7 +19,7 @@ from sim_twin.controller.wire.primary_state import PrimaryState, RobotModeData
 from sim_twin.controller.wire.realtime import RealtimeState
 
 HOST = "127.0.3.1"
-N_POLLS = 400
+N_POLLS = 20_000
 
 
 class Client:
@@ -28,9 +28,14 @@ class Client:
     def __init__(self, port, poll, n_receive_bytes=None):
         self._poll = poll
         self.socket = socket.socket()
+        self.socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         if n_receive_bytes:
             self.socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, n_receive_bytes)
-        self.socket.connect((HOST, port))
+        try:
+            self.socket.connect((HOST, port))
+        except OSError:
+            self.socket.close()
+            raise
         self.socket.setblocking(False)
         self.stock = b""
         self.is_ended = False
@@ -129,9 +134,7 @@ class Client:
         return kind, self.take(size - 5)
 
 
-ZERO_BY_KIND = {
-    kind: 0 if kind.n_items == 1 else (0,) * kind.n_items for kind in FieldType
-}
+ZERO_BY_KIND = {kind: 0 if kind.n_items == 1 else (0,) * kind.n_items for kind in FieldType}
 
 
 class Robot:
