@@ -10,7 +10,7 @@ import msgspec
 
 from sim_twin.controller.wire.dashboard_target import DashboardStatus, DashboardTarget, Outcome
 from sim_twin.controller.wire.lines import LineReader
-from sim_twin.controller.wire.reactor import Peer
+from sim_twin.controller.wire.peer import Peer
 from sim_twin.controller.wire.version import ControllerVersion
 
 __all__ = ["GREETING", "NOT_REMOTE", "TOO_EARLY", "DashboardServer"]
@@ -24,6 +24,7 @@ TOO_EARLY = (
     "Cannot unlock protective stop until 5s after occurrence. Always inspect cause of protective stop before unlocking"
 )
 _N_LINE_BYTES = 4096
+_N_WORDS = 4
 _ALWAYS = ((5, 0), (3, 0))
 
 
@@ -57,9 +58,7 @@ class DashboardServer:
         self._version = version
         self._clients: dict[Peer, _Client] = {}
         commands = _queries(target, version) | _power(target) | _programs(target) | _panel(target)
-        known = {words: command for words, command in commands.items() if version.has(*command.since)}
-        # Longest first, since "load installation" also starts with "load".
-        self._commands = dict(sorted(known.items(), key=lambda item: -len(item[0])))
+        self._commands = {words: command for words, command in commands.items() if version.has(*command.since)}
 
     def opened(self, peer: Peer) -> None:
         """Greet: ur_rtde waits for this line before it asks anything."""
@@ -101,9 +100,10 @@ class DashboardServer:
         return client.is_remote
 
     def _split(self, line: str) -> tuple[str, str]:
-        lower = line.lower()
-        for words in self._commands:
-            if lower == words or lower.startswith(f"{words} "):
+        """Return the longest command that the line begins with, and the rest: "load installation x" is no "load"."""
+        for n in range(_N_WORDS, 0, -1):
+            words = " ".join(line.split(" ", n)[:n]).lower()
+            if words in self._commands:
                 return words, line[len(words) :].strip()
         return "", ""
 

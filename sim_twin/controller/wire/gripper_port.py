@@ -10,7 +10,7 @@ from typing import Protocol
 import msgspec
 
 from sim_twin.controller.wire.lines import LineReader
-from sim_twin.controller.wire.reactor import Peer
+from sim_twin.controller.wire.peer import Peer
 
 __all__ = ["GripperMeasurement", "GripperRequest", "GripperServer", "GripperTarget"]
 

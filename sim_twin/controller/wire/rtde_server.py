@@ -7,11 +7,11 @@ message; inputs are taken before `start` too, since ur_rtde's IO interface never
 
 import math
 import struct
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import Protocol
 
 from sim_twin.controller.wire.errors import MalformedError
-from sim_twin.controller.wire.reactor import Peer
+from sim_twin.controller.wire.peer import Peer
 from sim_twin.controller.wire.rtde_codec import (
     FrameReader,
     Kind,
@@ -86,6 +86,7 @@ class RtdeServer:
         self._input_kinds = input_fields(version)
         self._clients: dict[Peer, _Client] = {}
         self._owner_by_input: dict[str, Peer] = {}
+        self._reserved: frozenset[str] = frozenset()
         self._answers: dict[int, Callable[[_Client, bytes], None]] = {
             Kind.PROTOCOL: self._choose_protocol,
             Kind.CONTROLLER: self._tell_version,
@@ -138,6 +139,10 @@ class RtdeServer:
         for client in tuple(self._clients.values()):
             self._say_to(client, message, level, source)
 
+    def reserve(self, names: Collection[str]) -> None:
+        """Fault: let these inputs be in use by a field bus from now on; no names frees them again."""
+        self._reserved = frozenset(names)
+
     def _answer(self, client: _Client, kind: int, payload: bytes) -> None:
         answer = self._answers.get(kind)
         if answer is None:
@@ -180,7 +185,7 @@ class RtdeServer:
         names = _names(payload)
         kinds = [self._input_kinds.get(name) for name in names]
         found = [kind for kind in kinds if kind is not None]
-        taken = {name for name in names if self._owner_by_input.get(name, client.peer) is not client.peer}
+        taken = {n for n in names if n in self._reserved or self._owner_by_input.get(n, client.peer) is not client.peer}
         recipe_id = len(client.inputs) + 1 if client.protocol > 1 else 1
         if not names or len(found) < len(kinds) or taken or recipe_id > _N_RECIPES:
             recipe_id = 0

@@ -4,18 +4,18 @@ from collections.abc import Callable
 from enum import Enum
 from typing import Protocol
 
+from sim_twin.controller.wire.peer import Budget, Peer
 from sim_twin.controller.wire.primary import pack_state
 from sim_twin.controller.wire.primary_messages import pack_version
 from sim_twin.controller.wire.primary_state import PrimaryState
-from sim_twin.controller.wire.reactor import Budget, Peer
 from sim_twin.controller.wire.realtime import RealtimeState, pack_realtime
 from sim_twin.controller.wire.script_framer import ScriptFramer
 from sim_twin.controller.wire.version import ControllerVersion
 
 __all__ = ["SCRIPT_BUDGET", "PortKind", "ScriptSink", "ScriptSource", "StatePort", "StatePorts", "StateSource"]
 
-# A script of ur_rtde has 42 kB; it arrives within six polls.
-SCRIPT_BUDGET = Budget(bytes_a_poll=8192)
+# A script of ur_rtde has 42 kB; it arrives within eleven polls.
+SCRIPT_BUDGET = Budget(bytes_a_poll=4096)
 _SLOW_STEPS = 50
 _OLD_STEPS = 4
 

@@ -7,6 +7,7 @@ from typing import Self
 from sim_twin.controller.wire.dashboard import DashboardServer
 from sim_twin.controller.wire.dashboard_target import DashboardTarget
 from sim_twin.controller.wire.gripper_port import GripperServer, GripperTarget
+from sim_twin.controller.wire.peer import Budget
 from sim_twin.controller.wire.reactor import Port, Reactor
 from sim_twin.controller.wire.rtde_server import InputSink, Outputs, RtdeServer
 from sim_twin.controller.wire.state_ports import SCRIPT_BUDGET, ScriptSink, StatePorts, StateSource
@@ -17,6 +18,9 @@ __all__ = ["DASHBOARD", "GRIPPER", "RTDE", "Wires"]
 DASHBOARD = 29999
 RTDE = 30004
 GRIPPER = 63352
+# What one peer can cost in one poll follows from these: some 2 ms at worst, for a flood of the smallest messages.
+_LINES = Budget(bytes_a_poll=256)
+_REGISTERS = Budget(bytes_a_poll=2048)
 
 
 class Wires:
@@ -73,12 +77,12 @@ class Wires:
         """
         listen = self._reactor.listen
         try:
-            self._port_by_number[DASHBOARD] = listen(host, 0 if is_free else DASHBOARD, self._dashboard)
-            self._port_by_number[RTDE] = listen(host, 0 if is_free else RTDE, self.rtde)
+            self._port_by_number[DASHBOARD] = listen(host, 0 if is_free else DASHBOARD, self._dashboard, _LINES)
+            self._port_by_number[RTDE] = listen(host, 0 if is_free else RTDE, self.rtde, _REGISTERS)
             for number, service in self.states.by_number.items():
                 self._port_by_number[number] = listen(host, 0 if is_free else number, service, SCRIPT_BUDGET)
             if self._gripper is not None:
-                self._port_by_number[GRIPPER] = listen(host, 0 if is_free else GRIPPER, self._gripper)
+                self._port_by_number[GRIPPER] = listen(host, 0 if is_free else GRIPPER, self._gripper, _LINES)
         except OSError:
             self.close()
             raise

@@ -5,7 +5,8 @@ import socket
 
 import pytest
 
-from sim_twin.controller.wire.reactor import Budget, Reactor
+from sim_twin.controller.wire.peer import Budget
+from sim_twin.controller.wire.reactor import Reactor
 from tests.support.wire_doubles import HOST, Client
 
 

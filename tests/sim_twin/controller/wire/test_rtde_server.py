@@ -178,6 +178,14 @@ def test_an_input_belongs_to_one_client_until_it_leaves(bench):
     assert second.inputs("input_int_register_25,input_int_register_26") == b"\x02INT32,INT32"
 
 
+def test_an_input_of_a_field_bus_is_in_use_until_it_is_free_again(bench):
+    client = bench.rtde()
+    bench.wires.rtde.reserve(["input_int_register_0"])
+    assert client.inputs("input_int_register_0") == b"\x00IN_USE"
+    bench.wires.rtde.reserve([])
+    assert client.inputs("input_int_register_0") == b"\x01INT32"
+
+
 def test_an_unknown_input_is_not_found_and_claims_nothing(bench):
     first, second = bench.rtde(), bench.rtde()
     assert first.inputs("input_int_register_3,nonsense,actual_q") == b"\x00INT32,NOT_FOUND,NOT_FOUND"
