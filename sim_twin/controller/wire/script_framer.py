@@ -13,7 +13,7 @@ __all__ = ["ScriptFramer"]
 _OPENING = re.compile(r"(def|sec)\s")
 _CLOSING = re.compile(r"end\s*(#.*)?$")
 _N_LINE_BYTES = 65_536
-_N_PROGRAM_CHARS = 4_194_304
+_N_PROGRAM_CHARS = 1_048_576
 
 
 class ScriptFramer:

@@ -146,9 +146,20 @@ def test_a_new_output_recipe_replaces_the_old_one(bench):
     client.outputs("timestamp,actual_q")
     client.rtde("S")
     assert client.outputs("robot_mode") == b"\x01INT32"
+    bench.wires.tick(1)
+    assert client.silent()
     client.rtde("S")
     bench.wires.tick(1)
     assert data(client) == struct.pack(">Bi", 1, 0)
+
+
+def test_a_recipe_that_fails_stops_the_data_of_the_one_before(bench):
+    client = bench.rtde()
+    client.outputs("timestamp")
+    client.rtde("S")
+    assert client.outputs("nonsense") == b"\x00NOT_FOUND"
+    bench.wires.tick(1)
+    assert client.silent()
 
 
 def test_input_recipes_are_numbered_and_written_by_number(bench):

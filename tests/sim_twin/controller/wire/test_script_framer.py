@@ -71,6 +71,13 @@ def test_a_program_without_end_is_given_up():
     assert framer.is_overlong
 
 
+def test_a_program_s_length_counts_for_itself_alone():
+    framer = ScriptFramer()
+    text = "def f():\n" + " sync() # a long line, so that the lines are few" * 1000 + "\nend\n"
+    assert framer.feed((text * 40).encode()) == [text] * 40
+    assert not framer.is_overlong
+
+
 @given(st.lists(st.sampled_from([PROGRAM, SECONDARY, "sync()\n", "textmsg(1)\n"]), max_size=6), st.data())
 def test_where_the_stream_is_cut_makes_no_difference(programs, cuts):
     stream = "".join(programs).encode()
