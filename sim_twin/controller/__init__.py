@@ -1,0 +1,1 @@
+"""A virtual Universal Robots controller: its wires, its script language and its states."""

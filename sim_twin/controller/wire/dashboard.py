@@ -1,0 +1,213 @@
+"""Port 29999: one command a line, one line back, in UR's exact words.
+
+The words are those of UR's dashboard pages and of what public clients match on. In local control the commands that act
+are refused, and a connection that was made in local control stays refused: UR asks for a reconnect, so does this.
+"""
+
+from collections.abc import Callable
+
+import msgspec
+
+from sim_twin.controller.wire.dashboard_target import DashboardStatus, DashboardTarget, Outcome
+from sim_twin.controller.wire.lines import LineReader
+from sim_twin.controller.wire.peer import Peer
+from sim_twin.controller.wire.version import ControllerVersion
+
+__all__ = ["GREETING", "NOT_REMOTE", "TOO_EARLY", "DashboardServer"]
+
+GREETING = "Connected: Universal Robots Dashboard Server"
+NOT_REMOTE = (
+    "Command is not allowed due to safety reasons, "
+    "please switch robot to Remote Control mode and reconnect to port 29999"
+)
+TOO_EARLY = (
+    "Cannot unlock protective stop until 5s after occurrence. Always inspect cause of protective stop before unlocking"
+)
+_N_LINE_BYTES = 4096
+_N_WORDS = 4
+_ALWAYS = ((5, 0), (3, 0))
+
+
+class _Command(msgspec.Struct, frozen=True):
+    """One command.
+
+    Attributes:
+        answer: Returns the reply to the text after the command's words.
+        is_acting: Whether it needs remote control.
+        since: First version of an e-Series and of a CB3 that knows it.
+    """
+
+    answer: Callable[[str], str]
+    is_acting: bool = False
+    since: tuple[tuple[int, ...] | None, tuple[int, ...] | None] = _ALWAYS
+
+
+class _Client:
+    """One client: its unfinished line, and whether it connected in remote control."""
+
+    def __init__(self, is_remote: bool) -> None:
+        self.lines = LineReader(_N_LINE_BYTES)
+        self.is_remote = is_remote
+
+
+class DashboardServer:
+    """Answers dashboard clients; a `Service` of the reactor."""
+
+    def __init__(self, *, target: DashboardTarget, version: ControllerVersion) -> None:
+        self._target = target
+        self._version = version
+        self._clients: dict[Peer, _Client] = {}
+        commands = _queries(target, version) | _power(target) | _programs(target) | _panel(target)
+        self._commands = {words: command for words, command in commands.items() if version.has(*command.since)}
+
+    def opened(self, peer: Peer) -> None:
+        """Greet: ur_rtde waits for this line before it asks anything."""
+        self._clients[peer] = _Client(self._target.status().is_remote)
+        peer.reply(f"{GREETING}\n".encode())
+
+    def received(self, peer: Peer, chunk: bytes) -> None:
+        """Answer the lines that are complete."""
+        client = self._clients[peer]
+        for line in client.lines.feed(chunk):
+            self._answer(peer, client, line.decode("utf-8", "replace").strip())
+            if not peer.is_open:
+                return
+        if client.lines.is_overlong:
+            peer.close()
+
+    def closed(self, peer: Peer) -> None:
+        """Forget the client."""
+        del self._clients[peer]
+
+    def _answer(self, peer: Peer, client: _Client, line: str) -> None:
+        if line.lower() == "quit":
+            peer.reply(b"Disconnected\n")
+            peer.close_when_sent()
+        else:
+            peer.reply(f"{self._reply(client, line)}\n".encode())
+
+    def _reply(self, client: _Client, line: str) -> str:
+        words, rest = self._split(line)
+        command = self._commands.get(words)
+        if command is None:
+            return f"could not understand: {line}"
+        if command.is_acting and self._version.has((5, 0), None) and not self._is_remote(client):
+            return NOT_REMOTE
+        return command.answer(rest)
+
+    def _is_remote(self, client: _Client) -> bool:
+        client.is_remote = client.is_remote and self._target.status().is_remote
+        return client.is_remote
+
+    def _split(self, line: str) -> tuple[str, str]:
+        """Return the longest command that the line begins with, and the rest: "load installation x" is no "load"."""
+        for n in range(_N_WORDS, 0, -1):
+            words = " ".join(line.split(" ", n)[:n]).lower()
+            if words in self._commands:
+                return words, line[len(words) :].strip()
+        return "", ""
+
+
+def _said(outcome: Outcome, done: str, failed: str) -> str:
+    return done if outcome is Outcome.DONE else failed
+
+
+def _queries(target: DashboardTarget, version: ControllerVersion) -> dict[str, _Command]:
+    def ask(tell: Callable[[DashboardStatus], str], since: tuple = _ALWAYS) -> _Command:
+        return _Command(lambda _rest: tell(target.status()), since=since)
+
+    def program(status: DashboardStatus) -> str:
+        return status.program.rsplit("/", 1)[-1] if status.program else "<unnamed>"
+
+    since_names = ((5, 6), (3, 12))
+    return {
+        "robotmode": ask(lambda s: f"Robotmode: {s.robot_mode}"),
+        "safetymode": ask(lambda s: f"Safetymode: {s.safety_mode}"),
+        "safetystatus": ask(lambda s: f"Safetystatus: {s.safety_status}", ((5, 4), (3, 11))),
+        "running": ask(lambda s: f"Program running: {_truth(s.is_running)}"),
+        "programstate": ask(lambda s: f"{s.program_state} {program(s)}"),
+        "get loaded program": ask(lambda s: f"Loaded program: {s.program}" if s.program else "No program loaded"),
+        "isprogramsaved": ask(lambda s: f"{_truth(s.is_program_saved)} {program(s)}"),
+        "is in remote control": ask(lambda s: _truth(s.is_remote), ((5, 6), None)),
+        "get operational mode": ask(lambda s: s.operational_mode, ((5, 6), None)),
+        "get robot model": ask(lambda s: s.robot_model, since_names),
+        "get serial number": ask(lambda s: s.serial_number, since_names),
+        "polyscopeversion": ask(lambda s: f"URSoftware {version} ({s.build_date})"),
+        "version": ask(lambda _s: str(version), ((5, 0), None)),
+    }
+
+
+def _truth(is_true: bool) -> str:
+    return "true" if is_true else "false"
+
+
+def _power(target: DashboardTarget) -> dict[str, _Command]:
+    def act(words: str, do: Callable[[], Outcome], done: str) -> _Command:
+        return _Command(lambda _rest: _said(do(), done, f"Failed to execute: {words}"), is_acting=True)
+
+    def unlock(_rest: str) -> str:
+        outcome = target.unlock_protective_stop()
+        if outcome is Outcome.TOO_EARLY:
+            return TOO_EARLY
+        return _said(outcome, "Protective stop releasing", "Failed to execute: unlock protective stop")
+
+    return {
+        "power on": act("power on", target.power_on, "Powering on"),
+        "power off": act("power off", target.power_off, "Powering off"),
+        "brake release": act("brake release", target.brake_release, "Brake releasing"),
+        "unlock protective stop": _Command(unlock, is_acting=True),
+        "close safety popup": act("close safety popup", target.close_safety_popup, "closing safety popup"),
+        "restart safety": act("restart safety", target.restart_safety, "Restarting safety"),
+        "shutdown": act("shutdown", target.shutdown, "Shutting down"),
+    }
+
+
+def _programs(target: DashboardTarget) -> dict[str, _Command]:
+    def act(words: str, do: Callable[[], Outcome], done: str) -> _Command:
+        return _Command(lambda _rest: _said(do(), done, f"Failed to execute: {words}"), is_acting=True)
+
+    def load(what: str, do: Callable[[str], Outcome], failed: str) -> _Command:
+        def answer(path: str) -> str:
+            outcome = do(path)
+            if outcome is Outcome.NOT_FOUND:
+                return f"File not found: {path}"
+            return _said(outcome, f"Loading {what}: {path}", f"{failed}: {path}")
+
+        return _Command(answer, is_acting=True)
+
+    return {
+        "play": act("play", target.play, "Starting program"),
+        "stop": act("stop", target.stop, "Stopped"),
+        "pause": act("pause", target.pause, "Pausing program"),
+        "load": load("program", target.load, "Error while loading program"),
+        "load installation": load("installation", target.load_installation, "Failed to load installation"),
+    }
+
+
+def _panel(target: DashboardTarget) -> dict[str, _Command]:
+    def say(words: str, do: Callable[[str], Outcome], done: str) -> _Command:
+        return _Command(lambda rest: _said(do(rest), done, f"Failed to execute: {words}"))
+
+    def set_mode(rest: str) -> str:
+        mode = rest.upper()
+        is_known = mode in ("MANUAL", "AUTOMATIC")
+        outcome = target.set_operational_mode(mode) if is_known else Outcome.FAILED
+        return _said(outcome, f"Operational mode {mode} is set", f"Failed setting operational mode to {rest}")
+
+    def clear_mode(_rest: str) -> str:
+        outcome = target.clear_operational_mode()
+        mode = target.status().operational_mode
+        done = f"No longer controlling the operational mode. Current operational mode: '{mode}'."
+        return _said(outcome, done, "Failed to execute: clear operational mode")
+
+    def set_role(rest: str) -> str:
+        return _said(target.set_user_role(rest), f"Setting user role: {rest}", f"Failed setting user role: {rest}")
+
+    return {
+        "popup": say("popup", target.popup, "showing popup"),
+        "close popup": say("close popup", lambda _rest: target.close_popup(), "closing popup"),
+        "addtolog": say("addToLog", target.add_to_log, "Added log message"),
+        "set operational mode": _Command(set_mode, is_acting=True),
+        "clear operational mode": _Command(clear_mode, is_acting=True),
+        "setuserrole": _Command(set_role, since=(None, (3, 1))),
+    }

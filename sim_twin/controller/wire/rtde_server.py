@@ -1,0 +1,238 @@
+"""Port 30004: state out and registers in, for several clients that may each speak protocol 1 or 2.
+
+Behaviour follows UR's RTDE guide. Where the guide is silent: a set-up with an unknown or taken field is answered with
+recipe id 0 and claims nothing; a data package that does not fit its recipe is left unread and answered with a text
+message; inputs are taken before `start` too, since ur_rtde's IO interface never sends it.
+"""
+
+import math
+import struct
+from collections.abc import Callable, Collection, Mapping, Sequence
+from typing import Protocol
+
+from sim_twin.controller.wire.errors import MalformedError
+from sim_twin.controller.wire.peer import Peer
+from sim_twin.controller.wire.rtde_codec import (
+    FrameReader,
+    Kind,
+    Level,
+    Recipe,
+    frame,
+    names_of,
+    pack_text,
+    unpack_frequency,
+)
+from sim_twin.controller.wire.rtde_fields import FieldType, Value, input_fields, output_fields
+from sim_twin.controller.wire.version import ControllerVersion
+
+__all__ = ["InputSink", "Outputs", "RtdeServer"]
+
+Outputs = Mapping[str, Callable[[], Value]]
+_STEP_HZ = 500.0
+_OLD_HZ = 125.0
+_N_NAMES_BYTES = 2048
+_N_RECIPES = 255
+_VERSION = struct.Struct(">4I")
+_SOURCE = "RTDE"
+_ACCEPTED, _REFUSED = b"\x01", b"\x00"
+
+
+class InputSink(Protocol):
+    """Takes what clients write; a value stays until it is written again, whoever leaves."""
+
+    def write(self, name: str, value: Value) -> None:
+        """Set one input; the name and the type are those of `input_fields`."""
+        ...
+
+
+class _Client:
+    """One client: its protocol, its recipes and its pace."""
+
+    def __init__(self, peer: Peer) -> None:
+        self.peer = peer
+        self.reader = FrameReader()
+        self.protocol = 1
+        self.output: Recipe | None = None
+        self.getters: list[tuple[Callable[[], Value], bool]] = []
+        self.inputs: dict[int, Recipe] = {}
+        self.divider = 1
+        self.is_started = False
+
+    def package(self) -> bytes:
+        """Return the next data package; only for a client with an output recipe."""
+        assert self.output is not None
+        numbers: list = []
+        for getter, is_vector in self.getters:
+            if is_vector:
+                numbers.extend(getter())  # pyright: ignore[reportArgumentType] -- the recipe says that it is a vector
+            else:
+                numbers.append(getter())
+        return self.output.pack(numbers)
+
+
+class RtdeServer:
+    """Answers RTDE clients; a `Service` of the reactor.
+
+    `tick` sends the packages that are due. Nothing that a client sends raises: a stream that cannot be followed any
+    more costs that client its connection.
+    """
+
+    def __init__(self, *, outputs: Outputs, inputs: InputSink, version: ControllerVersion) -> None:
+        self._outputs = outputs
+        self._sink = inputs
+        self._version = version
+        known = output_fields(version)
+        self._output_kinds = {name: kind for name, kind in known.items() if name in outputs}
+        self._input_kinds = input_fields(version)
+        self._clients: dict[Peer, _Client] = {}
+        self._owner_by_input: dict[str, Peer] = {}
+        self._reserved: frozenset[str] = frozenset()
+        self._answers: dict[int, Callable[[_Client, bytes], None]] = {
+            Kind.PROTOCOL: self._choose_protocol,
+            Kind.CONTROLLER: self._tell_version,
+            Kind.OUTPUTS: self._set_outputs,
+            Kind.INPUTS: self._set_inputs,
+            Kind.START: self._start,
+            Kind.PAUSE: self._pause,
+            Kind.DATA: self._write,
+            Kind.TEXT: lambda _client, _payload: None,
+        }
+
+    @property
+    def n_clients(self) -> int:
+        """Clients that are connected."""
+        return len(self._clients)
+
+    @property
+    def n_started(self) -> int:
+        """Clients that are being sent data."""
+        return sum(client.is_started for client in self._clients.values())
+
+    def opened(self, peer: Peer) -> None:
+        """Expect a new client's first message."""
+        self._clients[peer] = _Client(peer)
+
+    def received(self, peer: Peer, chunk: bytes) -> None:
+        """Answer the messages that are complete."""
+        client = self._clients[peer]
+        try:
+            for kind, payload in client.reader.feed(chunk):
+                self._answer(client, kind, payload)
+                if not peer.is_open:
+                    return
+        except MalformedError:
+            peer.close()
+
+    def closed(self, peer: Peer) -> None:
+        """Release every input that the client had claimed; their values stay."""
+        del self._clients[peer]
+        self._owner_by_input = {name: owner for name, owner in self._owner_by_input.items() if owner is not peer}
+
+    def tick(self, control_step: int) -> None:
+        """Send each started client its package if this 2 ms step is one of its own."""
+        for client in tuple(self._clients.values()):
+            if client.is_started and control_step % client.divider == 0:
+                client.peer.stream(client.package())
+
+    def say(self, message: str, *, level: Level = Level.INFO, source: str = _SOURCE) -> None:
+        """Send a text message to every client."""
+        for client in tuple(self._clients.values()):
+            self._say_to(client, message, level, source)
+
+    def reserve(self, names: Collection[str]) -> None:
+        """Fault: let these inputs be in use by a field bus from now on; no names frees them again."""
+        self._reserved = frozenset(names)
+
+    def _answer(self, client: _Client, kind: int, payload: bytes) -> None:
+        answer = self._answers.get(kind)
+        if answer is None:
+            self._say_to(client, f"expected one of the messages VvMUOISP, came type {kind}", Level.ERROR)
+        else:
+            answer(client, payload)
+
+    def _say_to(self, client: _Client, message: str, level: Level, source: str = _SOURCE) -> None:
+        client.peer.reply(pack_text(message, source=source, level=level, protocol=client.protocol))
+
+    def _choose_protocol(self, client: _Client, payload: bytes) -> None:
+        if len(payload) != 2:
+            raise MalformedError(f"expected a protocol version of 2 bytes, came {len(payload)}")
+        asked = int.from_bytes(payload, "big")
+        if asked in (1, 2):
+            client.protocol = asked
+        client.peer.reply(frame(Kind.PROTOCOL, _ACCEPTED if asked in (1, 2) else _REFUSED))
+
+    def _tell_version(self, client: _Client, _payload: bytes) -> None:
+        v = self._version
+        client.peer.reply(frame(Kind.CONTROLLER, _VERSION.pack(v.major, v.minor, v.bugfix, v.build)))
+
+    def _set_outputs(self, client: _Client, payload: bytes) -> None:
+        rate_hz = _OLD_HZ
+        if client.protocol > 1:
+            rate_hz, payload = unpack_frequency(payload)
+        names = _names(payload)
+        kinds = [self._output_kinds.get(name) for name in names]
+        client.is_started = False
+        found = [kind for kind in kinds if kind is not None]
+        if not names or len(found) < len(kinds):
+            client.output = None
+        else:
+            client.output = Recipe(names, found, recipe_id=1 if client.protocol > 1 else None)
+            client.getters = [(self._outputs[n], k.n_items > 1) for n, k in zip(names, found, strict=True)]
+            client.divider = self._divider(rate_hz)
+        self._confirm(client, Kind.OUTPUTS, int(client.output is not None), [kind or "NOT_FOUND" for kind in kinds])
+
+    def _set_inputs(self, client: _Client, payload: bytes) -> None:
+        names = _names(payload)
+        kinds = [self._input_kinds.get(name) for name in names]
+        found = [kind for kind in kinds if kind is not None]
+        taken = {n for n in names if n in self._reserved or self._owner_by_input.get(n, client.peer) is not client.peer}
+        recipe_id = len(client.inputs) + 1 if client.protocol > 1 else 1
+        if not names or len(found) < len(kinds) or taken or recipe_id > _N_RECIPES:
+            recipe_id = 0
+        else:
+            client.inputs[recipe_id] = Recipe(names, found, recipe_id=recipe_id if client.protocol > 1 else None)
+            self._owner_by_input |= dict.fromkeys(names, client.peer)
+        words = ["IN_USE" if n in taken else (k or "NOT_FOUND") for n, k in zip(names, kinds, strict=True)]
+        self._confirm(client, Kind.INPUTS, recipe_id, words)
+
+    def _confirm(self, client: _Client, kind: Kind, recipe_id: int, words: Sequence[FieldType | str]) -> None:
+        head = bytes([recipe_id]) if client.protocol > 1 else b""
+        client.peer.reply(frame(kind, head + ",".join(words).encode()))
+        if not words:
+            # After the reply: ur_rtde takes whatever comes next for it.
+            self._say_to(client, f"expected 1 to {_N_NAMES_BYTES} bytes of field names, set up fewer", Level.ERROR)
+
+    def _divider(self, rate_hz: float) -> int:
+        """Return how many 2 ms steps lie between two packages; no sensible rate means the fastest."""
+        fastest = round(_STEP_HZ / _OLD_HZ) if self._version.is_cb3 else 1
+        if not math.isfinite(rate_hz) or rate_hz <= 0.0:
+            return fastest
+        return max(fastest, round(min(_STEP_HZ / rate_hz, 1e6)))
+
+    def _start(self, client: _Client, _payload: bytes) -> None:
+        client.is_started = client.output is not None
+        client.peer.reply(frame(Kind.START, _ACCEPTED if client.is_started else _REFUSED))
+        if not client.is_started:
+            self._say_to(client, "expected an output recipe before start; set up at least one output", Level.ERROR)
+
+    def _pause(self, client: _Client, _payload: bytes) -> None:
+        client.is_started = False
+        client.peer.reply(frame(Kind.PAUSE, _ACCEPTED))
+
+    def _write(self, client: _Client, payload: bytes) -> None:
+        recipe_id, body = (payload[0] if payload else 0, payload[1:]) if client.protocol > 1 else (1, payload)
+        recipe = client.inputs.get(recipe_id)
+        if recipe is None:
+            self._say_to(client, f"expected an input recipe that was set up, came id {recipe_id}", Level.ERROR)
+            return
+        try:
+            values = recipe.unpack(body)
+        except MalformedError as problem:
+            self._say_to(client, str(problem), Level.ERROR)
+            return
+        for name, value in values:
+            self._sink.write(name, value)
+
+
+def _names(payload: bytes) -> list[str]:
+    return names_of(payload) if len(payload) <= _N_NAMES_BYTES else []
