@@ -1,0 +1,1 @@
+"""The virtual controller: what a Universal Robots controller shows to its clients."""
