@@ -33,9 +33,7 @@ def _remainder(a: Number, b: Number) -> Number:
     return int(rest) if type(a) is int and type(b) is int else rest
 
 
-def _arithmetic(
-    symbol: str, on_numbers: Callable[[Number, Number], Number]
-) -> Callable[[Value, Value], Value]:
+def _arithmetic(symbol: str, on_numbers: Callable[[Number, Number], Number]) -> Callable[[Value, Value], Value]:
     """Spread an operator on numbers over lists, number by number."""
 
     def apply(a: Value, b: Value) -> Value:
@@ -46,23 +44,25 @@ def _arithmetic(
                 return int32(result)
             return result
         if type(a) is list or type(b) is list:
-            return on_lists(a, b)
+            return _on_lists(symbol, apply, a, b)
         if type(a) is str and type(b) is str and symbol == "+":
             return a + b
         raise ScriptRuntimeError(f"{described(a)} {symbol} {described(b)} is not defined{_hint(a, b)}")
 
-    def on_lists(a: Value, b: Value) -> Value:
-        if type(a) is not list:
-            return [apply(a, part) for part in b] if type(b) is list else None
-        if type(b) is not list:
-            return [apply(part, b) for part in a]
-        if symbol == "*" and a and type(a[0]) is list:
-            return _matrix_product(a, b, apply)
-        if len(a) != len(b):
-            raise ScriptRuntimeError(f"list {symbol} list needs equal lengths, got {len(a)} and {len(b)}")
-        return [apply(x, y) for x, y in zip(a, b, strict=True)]
-
     return apply
+
+
+def _on_lists(symbol: str, apply: Callable[[Value, Value], Value], a: Value, b: Value) -> Value:
+    """Apply an operator where at least one side is a list."""
+    if type(a) is not list:
+        return [apply(a, part) for part in b] if type(b) is list else None
+    if type(b) is not list:
+        return [apply(part, b) for part in a]
+    if symbol == "*" and a and type(a[0]) is list:
+        return _matrix_product(a, b, apply)
+    if len(a) != len(b):
+        raise ScriptRuntimeError(f"list {symbol} list needs equal lengths, got {len(a)} and {len(b)}")
+    return [apply(x, y) for x, y in zip(a, b, strict=True)]
 
 
 def _matrix_product(a: list[Value], b: list[Value], multiply: Callable[[Value, Value], Value]) -> list[Value]:

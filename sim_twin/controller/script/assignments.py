@@ -73,7 +73,7 @@ def _path(target: Index | Member, scope: Scope) -> tuple[str, list[_Step]]:
             steps.append(node.name)
             node = node.owner
         else:
-            raise AssertionError("the parser lets only variables, elements and members stand before '='")
+            raise TypeError("the parser lets only variables, elements and members stand before '='")
     return node.name, steps[::-1]
 
 

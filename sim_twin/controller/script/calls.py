@@ -14,7 +14,7 @@ from sim_twin.controller.script.values import Value, copied
 __all__ = ["compile_call", "compile_run"]
 
 _MAX_DEPTH = 50  # of calls: Python's own stack must outlast them
-_BAD_ARGUMENTS = (TypeError, ValueError, LookupError, ArithmeticError, AttributeError)
+_BAD_ARGUMENTS = (TypeError, ValueError, LookupError, ArithmeticError)
 
 
 def compile_call(node: Call, scope: Scope, compiled: Callable[[Expression], Code[Value]]) -> Code[Value]:
@@ -37,7 +37,7 @@ def compile_call(node: Call, scope: Scope, compiled: Callable[[Expression], Code
     builtin = scope.context.builtins.get(node.name)
     if builtin is None:
         return _failing(f"the function '{node.name}' is not defined, neither in the program nor as a builtin")
-    mistake = _signature_mistake(builtin, len(positional), keywords)
+    mistake = _signature_mistake(scope.context.signature(node.name), len(positional), keywords)
     if mistake:
         return _failing(f"{node.name}(): {mistake}")
     return _call_of_builtin(node, scope.context, builtin, positional, keywords)
@@ -163,10 +163,10 @@ def _open(context: Context, routine: Routine) -> None:
         raise ScriptRuntimeError(f"{name}() calls itself too deep, at most {_MAX_DEPTH} calls may be open")
 
 
-def _signature_mistake(builtin: Builtin, n_positional: int, keywords: Mapping[str, Code[Value]]) -> str:
-    try:
-        signature = inspect.signature(builtin)
-    except ValueError:  # some of Python's own have none
+def _signature_mistake(
+    signature: inspect.Signature | None, n_positional: int, keywords: Mapping[str, Code[Value]]
+) -> str:
+    if signature is None:
         return ""
     try:
         signature.bind(*[None] * n_positional, **dict.fromkeys(keywords))
@@ -205,8 +205,8 @@ def _call_of_builtin(
     def value_of(*values: Value) -> Value:
         result = result_of(*values)
         if isinstance(result, GeneratorType):
-            raise AssertionError(f"builtin {node.name} returned a generator, so declare it as a generator function")
-        return result
+            raise TypeError(f"builtin {node.name} returned a generator, so declare it as a generator function")
+        return result  # pyright: ignore[reportReturnType] - no generator, as tested
 
     return applied(value_of, operands)
 
@@ -219,9 +219,9 @@ def _slow_builtin(
     def run(frame: Frame) -> Steps[Value]:
         values: list[Value] = []
         for operand in operands:
-            values.append((yield from operand.run(frame)) if isinstance(operand, Slow) else operand.run(frame))
+            values.append((yield from operand.run(frame)) if isinstance(operand, Slow) else operand.run(frame))  # noqa: PERF401 - none may yield
         steps = result_of(*values)
-        if not isinstance(steps, GeneratorType):
+        if not isinstance(steps, Generator):
             return steps
         try:
             return (yield from steps)

@@ -66,7 +66,7 @@ def _applied_slowly(function: Callable[..., Value], operands: Sequence[Code[Valu
     def run(frame: Frame) -> Steps[Value]:
         values: list[Value] = []
         for operand in operands:
-            values.append((yield from operand.run(frame)) if isinstance(operand, Slow) else operand.run(frame))
+            values.append((yield from operand.run(frame)) if isinstance(operand, Slow) else operand.run(frame))  # noqa: PERF401 - none may yield
         return function(*values)
 
     return Slow(run)

@@ -44,7 +44,7 @@ class Context:
         scheduler: Scheduler,
         meter: Meter,
         variables: Mapping[str, Value],
-        compile_body: "Callable[[Scope], Code[Signal | None]]",
+        compile_routine: "Callable[[Routine], None]",
     ) -> None:
         self.builtins = builtins
         self.meter = meter
@@ -52,17 +52,27 @@ class Context:
         self.global_places = {name: i for i, name in enumerate(sorted(global_names(program) | variables.keys()))}
         self.globals: Frame = [variables.get(name, UNSET) for name in self.global_places]
         self.slow = slow_functions(program, {name for name, builtin in builtins.items() if takes_time(builtin)})
-        self._compile_body = compile_body
+        self._compile_routine = compile_routine
+        self._signatures: dict[str, inspect.Signature | None] = {}
         self._routines: dict[int, Routine] = {}
 
     def routine(self, definition: Definition, around: Functions) -> "Routine":
         """Return a function or thread, compiled at the first call of this method."""
         known = self._routines.get(id(definition))
         if known is None:
-            scope = Scope(self, definition, around, is_main=False)
-            known = self._routines[id(definition)] = Routine(definition, scope)
-            known.body = self._compile_body(scope)
+            known = Routine(definition, Scope(self, definition, around, is_main=False))
+            self._routines[id(definition)] = known
+            self._compile_routine(known)
         return known
+
+    def signature(self, name: str) -> inspect.Signature | None:
+        """Return a builtin's signature, or None where Python knows none; to look it up takes as long as ten calls."""
+        if name not in self._signatures:
+            try:
+                self._signatures[name] = inspect.signature(self.builtins[name])
+            except ValueError:
+                self._signatures[name] = None
+        return self._signatures[name]
 
 
 class Scope:
@@ -112,12 +122,14 @@ class Routine:
         definition: From the tree.
         scope: Of its body.
         body: Its code, set once compiled; a recursive call finds it there when it runs.
+        defaults: Code of the parameters' defaults, likewise.
     """
 
     def __init__(self, definition: Definition, scope: Scope) -> None:
         self.definition = definition
         self.scope = scope
         self.body: Code[Signal | None] | None = None
+        self.defaults: dict[str, Code[Value]] = {}
 
     def frame(self) -> Frame:
         """Return a frame whose variables have no values; without a return the function's value is None."""

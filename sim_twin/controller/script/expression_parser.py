@@ -176,10 +176,10 @@ class ExpressionParser:
         if kind == "string":
             self.advance()
             return Constant(text[1:-1])
-        if kind in ("True", "False"):
-            self.advance()
-            return Constant(kind == "True")
-        self.fail("a value")
+        if kind not in ("True", "False"):
+            self.fail("a value")
+        self.advance()
+        return Constant(kind == "True")
 
     def _parenthesised(self) -> Expression:
         self.advance()

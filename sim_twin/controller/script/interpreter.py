@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from sim_twin.controller.script.code import Builtins, Slow
 from sim_twin.controller.script.context import Context, Scope
 from sim_twin.controller.script.errors import ScriptFault, ScriptRuntimeError
-from sim_twin.controller.script.statements import compile_body
+from sim_twin.controller.script.statements import compile_body, compile_routine
 from sim_twin.controller.script.syntax import Definition, Program
 from sim_twin.controller.script.threads import Meter, ProgramHalted, Scheduler, Steps
 from sim_twin.controller.script.values import Value, copied
@@ -62,7 +62,7 @@ class Interpreter:
             scheduler=self._scheduler,
             meter=self._meter,
             variables={name: copied(value) for name, value in (variables or {}).items()},
-            compile_body=compile_body,
+            compile_routine=compile_routine,
         )
         definition = Definition(1, program.name, False, (), program.body)
         scope = Scope(context, definition, None, is_main=True)

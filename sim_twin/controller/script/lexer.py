@@ -9,8 +9,8 @@ from sim_twin.controller.script.errors import ScriptSyntaxError
 __all__ = ["KEYWORDS", "Token", "tokens_of"]
 
 KEYWORDS = frozenset(
-    "def sec thread end if elif else while break continue return global local and or xor not True False run kill join"
-    " enter_critical exit_critical halt".split()
+    {"def", "sec", "thread", "end", "if", "elif", "else", "while", "break", "continue", "return", "global", "local"}
+    | {"and", "or", "xor", "not", "True", "False", "run", "kill", "join", "enter_critical", "exit_critical", "halt"}
 )
 
 # Ordered by how often each occurs. A label, `$ 7 "text"`, is what PolyScope writes between statements.

@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 from sim_twin.controller.script.assignments import compile_assignment
 from sim_twin.controller.script.code import Code, Fast, Frame, Signal, Slow
-from sim_twin.controller.script.context import Scope
+from sim_twin.controller.script.context import Routine, Scope
 from sim_twin.controller.script.errors import ScriptRuntimeError
 from sim_twin.controller.script.expressions import compile_expression
 from sim_twin.controller.script.syntax import (
@@ -23,7 +23,7 @@ from sim_twin.controller.script.syntax import (
 from sim_twin.controller.script.threads import ProgramHalted, Steps, Wait
 from sim_twin.controller.script.values import Value, copied, truth
 
-__all__ = ["compile_body"]
+__all__ = ["compile_body", "compile_routine"]
 
 Ending = Signal | None
 
@@ -31,6 +31,15 @@ Ending = Signal | None
 def compile_body(scope: Scope) -> Code[Ending]:
     """Compile the body of a function, a thread or the program."""
     return _block(scope.body, scope)
+
+
+def compile_routine(routine: Routine) -> None:
+    """Compile a function or thread: its body and the defaults of its parameters."""
+    scope = routine.scope
+    for parameter in routine.definition.parameters:
+        if parameter.default is not None:
+            routine.defaults[parameter.name] = compile_expression(parameter.default, scope)
+    routine.body = compile_body(scope)
 
 
 def _block(body: tuple[Statement, ...], scope: Scope) -> Code[Ending]:

@@ -1,6 +1,6 @@
 """The tree of a program. Nodes are plain and never change; a statement knows its line."""
 
-from typing import TypeAlias, Union
+from typing import TypeAlias
 
 import msgspec
 
@@ -131,22 +131,22 @@ class Run(msgspec.Struct, frozen=True):
     name: str
 
 
-Expression: TypeAlias = Union[  # noqa: UP007 - the classes above name it as text
-    Constant,
-    Name,
-    ListLiteral,
-    PoseLiteral,
-    StructLiteral,
-    Unary,
-    Not,
-    Binary,
-    Logic,
-    Index,
-    Member,
-    Call,
-    MethodCall,
-    Run,
-]
+Expression: TypeAlias = (
+    Constant
+    | Name
+    | ListLiteral
+    | PoseLiteral
+    | StructLiteral
+    | Unary
+    | Not
+    | Binary
+    | Logic
+    | Index
+    | Member
+    | Call
+    | MethodCall
+    | Run
+)
 
 
 class Assign(msgspec.Struct, frozen=True):
@@ -233,9 +233,7 @@ class Definition(msgspec.Struct, frozen=True):
     body: "tuple[Statement, ...]"
 
 
-Statement: TypeAlias = Union[  # noqa: UP007 - the classes above name it as text
-    Assign, Evaluate, If, While, Jump, Return, ThreadAction, Critical, Halt, Definition
-]
+Statement: TypeAlias = Assign | Evaluate | If | While | Jump | Return | ThreadAction | Critical | Halt | Definition
 
 
 class Program(msgspec.Struct, frozen=True):

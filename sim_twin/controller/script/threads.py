@@ -109,8 +109,7 @@ class Scheduler:
     def stop(self) -> None:
         """End all threads."""
         for thread in list(self._threads.values()):
-            if thread.is_alive and not thread.work.gi_running:
-                thread.work.close()
+            thread.work.close()
             self._end(thread)
 
     @property
@@ -180,7 +179,9 @@ class Scheduler:
         if isinstance(wait, Wait):
             return wait
         if not self._may_take_time:
-            raise ScriptRuntimeError("a secondary program may not take physical time: no sync, sleep or motion in a sec")
+            raise ScriptRuntimeError(
+                "a secondary program may not take physical time: no sync, sleep or motion in a sec"
+            )
         return None
 
     def _thread(self, handle: Value, word: str) -> Thread | None:

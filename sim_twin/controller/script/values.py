@@ -19,7 +19,7 @@ __all__ = [
     "truth",
 ]
 
-Value: TypeAlias = Union[None, bool, int, float, str, Pose, "list[Value]", "ScriptStruct"]  # noqa: UP007 - recursive
+Value: TypeAlias = Union[bool, int, float, str, Pose, "list[Value]", "ScriptStruct", None]
 
 
 class ScriptStruct:
@@ -73,7 +73,7 @@ def stored(container: Value, index: Value, value: Value) -> Value:
         if type(value) is not float and type(value) is not int:
             raise ScriptRuntimeError(f"expected a number as element of a pose, got {described(value)}")
         at = _checked(index, container)
-        return Pose(*container[:at], float(value), *container[at + 1 :])
+        return container._replace(**{Pose._fields[at]: float(value)})
     raise ScriptRuntimeError(f"expected a list or a pose before [ ], got {described(container)}")
 
 
