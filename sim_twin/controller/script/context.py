@@ -1,7 +1,7 @@
 """What compiled code of one program shares, and where each name of a function lives."""
 
 import inspect
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 
 from sim_twin.controller.script.code import UNSET, Builtin, Builtins, Code, Frame, Signal
 from sim_twin.controller.script.scopes import (
@@ -34,6 +34,8 @@ class Context:
         globals: Values of the global variables.
         global_places: Where in it each is.
         slow: Names of the program's functions that can take time.
+        to_compile: Functions that are called but not compiled yet; one after another, so that a long chain of calls
+            needs no deep stack.
     """
 
     def __init__(
@@ -44,7 +46,6 @@ class Context:
         scheduler: Scheduler,
         meter: Meter,
         variables: Mapping[str, Value],
-        compile_routine: "Callable[[Routine], None]",
     ) -> None:
         self.builtins = builtins
         self.meter = meter
@@ -52,17 +53,17 @@ class Context:
         self.global_places = {name: i for i, name in enumerate(sorted(global_names(program) | variables.keys()))}
         self.globals: Frame = [variables.get(name, UNSET) for name in self.global_places]
         self.slow = slow_functions(program, {name for name, builtin in builtins.items() if takes_time(builtin)})
-        self._compile_routine = compile_routine
         self._signatures: dict[str, inspect.Signature | None] = {}
         self._routines: dict[int, Routine] = {}
+        self.to_compile: list[Routine] = []
 
     def routine(self, definition: Definition, around: Functions) -> "Routine":
-        """Return a function or thread, compiled at the first call of this method."""
+        """Return a function or thread, which from then on waits to be compiled."""
         known = self._routines.get(id(definition))
         if known is None:
             known = Routine(definition, Scope(self, definition, around, is_main=False))
             self._routines[id(definition)] = known
-            self._compile_routine(known)
+            self.to_compile.append(known)
         return known
 
     def signature(self, name: str) -> inspect.Signature | None:

@@ -31,7 +31,7 @@ _PRECEDENCE |= dict.fromkeys(("==", "!=", "<", "<=", ">", ">="), 5)
 _PRECEDENCE |= dict.fromkeys("+-", 6) | dict.fromkeys("*/%", 7)
 _NOT = 4
 _MAX_DEPTH = 40  # of blocks, brackets and prefixes together: Python's own stack must outlast the deepest program
-_MAX_CHAIN = 100  # of operators of one level: a + b + c + ...
+_MAX_HEIGHT = 100  # of an expression's tree, to which a + b + c + ... adds one an operator
 
 
 class ExpressionParser:
@@ -50,6 +50,7 @@ class ExpressionParser:
         self.token = tokens[0]
         self.kind = self.token.kind
         self.depth = 0
+        self._height = 0  # of the expression parsed last
 
     def advance(self) -> Token:
         """Take the next token."""
@@ -77,6 +78,12 @@ class ExpressionParser:
         if self.depth > _MAX_DEPTH:
             self.fail(f"at most {_MAX_DEPTH} blocks and brackets inside one another", got="one more")
 
+    def _grow(self, height: int) -> None:
+        """Count a node above two parts: the one parsed last and one of this height."""
+        self._height = 1 + max(height, self._height)
+        if self._height > _MAX_HEIGHT:
+            self.fail(f"expressions of at most {_MAX_HEIGHT} operators and brackets above one another", got="one more")
+
     def fail(self, expected: str, *, got: str = "") -> NoReturn:
         """Give up at the next token."""
         token = self.token
@@ -91,16 +98,14 @@ class ExpressionParser:
 
     def _binary(self, lowest: int) -> Expression:
         left = self._prefix()
-        length = 0
         while (level := _PRECEDENCE.get(self.kind, 0)) >= lowest:
             if level <= 3:
                 left = self._logic(left, level)
                 continue
             symbol = self.advance().kind
+            height = self._height
             left = Binary(symbol, left, self._binary(level + 1))
-            length += 1
-            if length > _MAX_CHAIN:
-                self.fail(f"at most {_MAX_CHAIN} operators in one chain", got="one more")
+            self._grow(height)
         return left
 
     def _logic(self, first: Expression, level: int) -> Expression:
@@ -108,7 +113,10 @@ class ExpressionParser:
         operands = [first]
         while self.kind == word:
             self.advance()
+            height = self._height
             operands.append(self._binary(level + 1))
+            self._height = max(height, self._height)
+        self._grow(0)
         return Logic(word, tuple(operands))
 
     def _prefix(self) -> Expression:
@@ -119,6 +127,7 @@ class ExpressionParser:
         self.descend()
         operand = self._binary(_NOT + 1) if kind == "not" else self._prefix()
         self.depth -= 1
+        self._grow(0)
         if kind == "not":
             return Not(operand)
         if kind == "-" and isinstance(operand, Constant) and type(operand.value) in (int, float):
@@ -127,13 +136,12 @@ class ExpressionParser:
 
     def postfix(self) -> Expression:
         """Parse an operand with the indexes, members and calls behind it."""
+        self._height = 0
         result = self._primary()
-        length = 0
         while self.kind in ("[", ".") and not self.token.is_first:
-            length += 1
-            if length > _MAX_DEPTH:
-                self.fail(f"at most {_MAX_DEPTH} indexes in one chain", got="one more")
+            height = self._height
             result = self._indexed(result) if self.kind == "[" else self._of(result)
+            self._grow(height)
         return result
 
     def _indexed(self, container: Expression) -> Expression:
@@ -200,11 +208,14 @@ class ExpressionParser:
         self.expect(opening)
         self.descend()
         elements: list[Expression] = []
+        height = 0
         while self.kind != closing:
             elements.append(self.expression())
+            height = max(height, self._height)
             if self.kind != closing:
                 self.expect(",")
         self.depth -= 1
+        self._grow(height)
         self.advance()
         return tuple(elements)
 
@@ -213,6 +224,7 @@ class ExpressionParser:
         self.descend()
         positional: list[Expression] = []
         keywords: dict[str, Expression] = {}
+        height = 0
         while self.kind != ")":
             if self.kind == "name" and self._tokens[self._at + 1].kind == "=":
                 self._keyword(keywords)
@@ -220,9 +232,11 @@ class ExpressionParser:
                 self.fail("a keyword argument after a keyword argument")
             else:
                 positional.append(self.expression())
+            height = max(height, self._height)
             if self.kind != ")":
                 self.expect(",")
         self.depth -= 1
+        self._grow(height)
         self.advance()
         if name.text == "struct" and not positional:
             return StructLiteral(tuple(keywords.items()))

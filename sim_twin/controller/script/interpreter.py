@@ -3,7 +3,7 @@
 import enum
 from collections.abc import Mapping
 
-from sim_twin.controller.script.code import Builtins, Slow
+from sim_twin.controller.script.code import Builtins, Code, Signal, Slow
 from sim_twin.controller.script.context import Context, Scope
 from sim_twin.controller.script.errors import ScriptFault, ScriptRuntimeError
 from sim_twin.controller.script.statements import compile_body, compile_routine
@@ -62,12 +62,13 @@ class Interpreter:
             scheduler=self._scheduler,
             meter=self._meter,
             variables={name: copied(value) for name, value in (variables or {}).items()},
-            compile_routine=compile_routine,
         )
         definition = Definition(1, program.name, False, (), program.body)
         scope = Scope(context, definition, None, is_main=True)
-        self._scheduler.start(program.name, _work(scope))
-        self._main = self._scheduler.main()
+        body = compile_body(scope)
+        while context.to_compile:
+            compile_routine(context.to_compile.pop())
+        self._main = self._scheduler.start_main(program.name, _work(body))
 
     @property
     def line(self) -> int:
@@ -79,7 +80,7 @@ class Interpreter:
         if self.status is not Status.RUNNING:
             return self.status
         try:
-            self._scheduler.step(self._main)
+            self._scheduler.step()
         except ProgramHalted:
             self._end(Status.FINISHED)
         except ScriptRuntimeError as error:
@@ -106,13 +107,8 @@ class Interpreter:
         self.status = status
 
 
-def _work(scope: Scope) -> Steps[object]:
-    body = compile_body(scope)
-
-    def work() -> Steps[object]:
-        if isinstance(body, Slow):
-            yield from body.run([None])
-        else:
-            body.run([None])
-
-    return work()
+def _work(body: Code[Signal | None]) -> Steps[object]:
+    if isinstance(body, Slow):
+        yield from body.run([None])
+    else:
+        body.run([None])

@@ -79,6 +79,7 @@ class Scheduler:
         self._threads: dict[int, Thread] = {}  # live ones, in the order of their start
         self._n_started = 0
         self._turn: list[Thread] = []
+        self._main: Thread | None = None
         self._holder: Thread | None = None
         self._n_entered = 0
         self._held_off: set[Thread] = set()
@@ -91,6 +92,11 @@ class Scheduler:
         self._threads[self._n_started] = thread
         self._turn.append(thread)
         return self._n_started
+
+    def start_main(self, name: str, work: Steps[object]) -> Thread:
+        """Add the thread with which the program ends."""
+        self._main = self._threads[self.start(name, work)]
+        return self._main
 
     def kill(self, handle: Value) -> None:
         """End a thread; a handle of a thread that is no more, and 0, which names none, are let pass."""
@@ -129,23 +135,19 @@ class Scheduler:
             if not self._n_entered:
                 self._holder = None
 
-    def step(self, main: Thread | None = None) -> None:
+    def step(self) -> None:
         """Run one slice, or as much of it as there is before the main thread ends."""
         for thread in self._threads.values():
             thread.left = self._budget
         self._turn = turn = list(self._threads.values())
         self._held_off.clear()
         while turn:
-            again, is_any_ahead = self._round(turn, main)
+            again, is_any_ahead = self._round(turn)
             if not is_any_ahead:
                 return
             self._turn = turn = again
 
-    def main(self) -> Thread:
-        """Return the thread that was started first."""
-        return self._threads[1]
-
-    def _round(self, turn: list[Thread], main: Thread | None) -> tuple[list[Thread], bool]:
+    def _round(self, turn: list[Thread]) -> tuple[list[Thread], bool]:
         """Give each its turn; return who could not use it, and whether anybody did."""
         again: list[Thread] = []
         is_any_ahead = False
@@ -161,7 +163,7 @@ class Scheduler:
             if wait is not None:
                 again.append(thread)
             is_any_ahead |= wait is not Wait.JOIN
-            if main is not None and not main.is_alive:
+            if self._main is not None and not self._main.is_alive:
                 return [], False
         return again, is_any_ahead
 
