@@ -8,7 +8,7 @@ import operator
 from collections.abc import Callable
 
 from sim_twin.controller.script.errors import ScriptRuntimeError
-from sim_twin.controller.script.values import Value, described
+from sim_twin.controller.script.values import Value, described, joined
 
 __all__ = ["BINARY", "UNARY", "int32"]
 
@@ -46,7 +46,7 @@ def _arithmetic(symbol: str, on_numbers: Callable[[Number, Number], Number]) -> 
         if type(a) is list or type(b) is list:
             return _on_lists(symbol, apply, a, b)
         if type(a) is str and type(b) is str and symbol == "+":
-            return a + b
+            return joined(a, b)
         raise ScriptRuntimeError(f"{described(a)} {symbol} {described(b)} is not defined{_hint(a, b)}")
 
     return apply

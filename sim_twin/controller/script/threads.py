@@ -17,6 +17,9 @@ __all__ = ["Meter", "ProgramHalted", "Scheduler", "Steps", "Thread", "Wait"]
 T = TypeVar("T")
 
 
+_MAX_THREADS = 100
+
+
 class Wait(enum.Enum):
     """Why a thread pauses without taking time; a plain yield of None takes the rest of its slice."""
 
@@ -77,7 +80,7 @@ class Scheduler:
         self._budget = slice_budget
         self._may_take_time = may_take_time
         self._threads: dict[int, Thread] = {}  # live ones, in the order of their start
-        self._n_started = 0
+        self._n_started = self._n_started_in_slice = 0
         self._turn: list[Thread] = []
         self._main: Thread | None = None
         self._holder: Thread | None = None
@@ -87,6 +90,9 @@ class Scheduler:
 
     def start(self, name: str, work: Steps[object]) -> int:
         """Add a thread, which gets its first turn in this slice, and return its handle."""
+        self._n_started_in_slice += 1
+        if max(self._n_started_in_slice, len(self._threads)) > _MAX_THREADS:
+            raise ScriptRuntimeError(f"run {name}: expected at most {_MAX_THREADS} threads, and starts in one slice")
         self._n_started += 1
         thread = Thread(name, work, self._budget)
         self._threads[self._n_started] = thread
@@ -141,6 +147,7 @@ class Scheduler:
             thread.left = self._budget
         self._turn = turn = list(self._threads.values())
         self._held_off.clear()
+        self._n_started_in_slice = 0
         while turn:
             again, is_any_ahead = self._round(turn)
             if not is_any_ahead:

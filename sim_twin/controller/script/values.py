@@ -12,6 +12,7 @@ __all__ = [
     "copied",
     "described",
     "item",
+    "joined",
     "member",
     "stored",
     "stored_member",
@@ -20,6 +21,10 @@ __all__ = [
 ]
 
 Value: TypeAlias = Union[bool, int, float, str, Pose, "list[Value]", "ScriptStruct", None]
+
+
+_MAX_ELEMENTS = 10_000
+_MAX_CHARACTERS = 65_536
 
 
 class ScriptStruct:
@@ -37,12 +42,31 @@ class ScriptStruct:
 
 
 def copied(value: Value) -> Value:
-    """Return a value that shares nothing with this one: URScript assigns and passes by value."""
-    if type(value) is list:
-        return [copied(part) if type(part) in (list, ScriptStruct) else part for part in value]
-    if type(value) is ScriptStruct:
-        return ScriptStruct({name: copied(part) for name, part in value.members.items()})
+    """Return a value that shares nothing with this one: URScript assigns and passes by value.
+
+    Everything that grows passes here, so here is where a list of lists that doubles at every turn comes to its end.
+    """
+    if type(value) is list or type(value) is ScriptStruct:
+        return _copied(value, [_MAX_ELEMENTS])
     return value
+
+
+def _copied(value: Value, room: list[int]) -> Value:
+    if type(value) is list:
+        room[0] -= len(value)
+        if room[0] < 0:
+            raise ScriptRuntimeError(f"the list is too long, expected at most {_MAX_ELEMENTS} elements in all")
+        return [_copied(part, room) if type(part) in (list, ScriptStruct) else part for part in value]
+    if type(value) is ScriptStruct:
+        return ScriptStruct({name: _copied(part, room) for name, part in value.members.items()})
+    return value
+
+
+def joined(first: str, second: str) -> str:
+    """Return two strings as one."""
+    if len(first) + len(second) > _MAX_CHARACTERS:
+        raise ScriptRuntimeError(f"the string is too long, expected at most {_MAX_CHARACTERS} characters")
+    return first + second
 
 
 def truth(value: Value) -> bool:

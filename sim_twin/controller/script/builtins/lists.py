@@ -3,11 +3,12 @@
 from sim_twin.controller.script.arithmetic import int32
 from sim_twin.controller.script.builtins.arguments import flag, integer, text, values
 from sim_twin.controller.script.code import Builtins
-from sim_twin.controller.script.values import Value, copied, described, text_of
+from sim_twin.controller.script.values import Value, copied, described, joined, text_of
 
 __all__ = ["LISTS"]
 
 _N_BITS = 32
+_N_ELEMENTS_MAX = 10_000
 
 
 def _length(v: Value) -> Value:
@@ -25,6 +26,8 @@ def _make_list(length: Value, initial_value: Value, capacity: Value = None) -> V
     n = integer(length)
     if n < 0 or (capacity is not None and integer(capacity) < n):
         raise ValueError(f"expected a length of 0 up to the capacity, got {n}")
+    if n > _N_ELEMENTS_MAX:
+        raise ValueError(f"expected a length of at most {_N_ELEMENTS_MAX}, got {n}")
     return [copied(initial_value) for _ in range(n)]
 
 
@@ -59,7 +62,7 @@ def _to_str(value: Value) -> Value:
 
 
 def _str_cat(op1: Value, op2: Value) -> Value:
-    return text_of(op1) + text_of(op2)
+    return joined(text_of(op1), text_of(op2))
 
 
 def _str_at(src: Value, index: Value) -> Value:

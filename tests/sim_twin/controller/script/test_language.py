@@ -200,7 +200,11 @@ def test_p_with_one_index_is_a_variable_and_with_six_numbers_a_pose():
 
 
 def test_a_matrix_has_two_indexes():
-    assert notes_of("m = [[1, 2], [3, 4]]\nm[1, 0] = 9\nnote(m[1, 0])\nnote(m[1][1])\nnote(m)") == [9, 4, [[1, 2], [9, 4]]]
+    assert notes_of("m = [[1, 2], [3, 4]]\nm[1, 0] = 9\nnote(m[1, 0])\nnote(m[1][1])\nnote(m)") == [
+        9,
+        4,
+        [[1, 2], [9, 4]],
+    ]
 
 
 def test_structs_have_members():

@@ -2,14 +2,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sim_twin.controller.script import Program, ScriptSyntaxError, parse_program
+from sim_twin.controller.script import Interpreter, Program, ScriptSyntaxError, Status, parse_program
 from sim_twin.controller.script.lexer import KEYWORDS, tokens_of
 from sim_twin.controller.script.syntax import Assign, Binary, Call, Constant, Evaluate, Logic, Name, PoseLiteral
 from tests.support.scripts import program
 
 WORDS = [
     *sorted(KEYWORDS),
-    *["a", "b", "p", "f", "struct", "1", "2.5", "0x1F", '"s"', "# c", "$ 1 \"x\"", "\n", "\n\n", "    "],
+    *["a", "b", "p", "f", "struct", "1", "2.5", "0x1F", '"s"', "# c", '$ 1 "x"', "\n", "\n\n", "    "],
     *["(", ")", "[", "]", ",", ":", ";", "=", "==", "!=", "<", "<=", ">", ">=", "+", "-", "*", "/", "%", ".", "p["],
 ]
 TEMPLATES = [
@@ -51,7 +51,9 @@ def test_any_words_in_a_program_parse_or_are_refused(template, first, second):
 
 @given(st.data())
 def test_a_program_with_a_piece_cut_out_parses_or_is_refused(data):
-    text = program("global a = p[1, 2, 3, 4, 5, 6]\nthread t():\n while not a[0] > 2:\n f(a, b=[1])\n end\nend\nh = run t()")
+    text = program(
+        "global a = p[1, 2, 3, 4, 5, 6]\nthread t():\n while not a[0] > 2:\n f(a, b=[1])\n end\nend\nh = run t()"
+    )
     begin = data.draw(st.integers(0, len(text)))
     end = data.draw(st.integers(begin, len(text)))
     parse_or_refuse(text[:begin] + text[end:])
@@ -81,8 +83,16 @@ def test_a_program_with_a_piece_cut_out_parses_or_is_refused(data):
         lambda n: "x = " + "9" * n,
     ],
 )
-def test_however_deep_or_long_a_program_is_it_parses_or_is_refused(shape, n):
-    parse_or_refuse(program(shape(n)))
+def test_however_deep_or_long_a_program_is_it_is_refused_or_runs(shape, n):
+    text = program(shape(n))
+    parse_or_refuse(text)
+    try:
+        parsed = parse_program(text)
+    except ScriptSyntaxError:
+        return
+    interpreter = Interpreter(parsed, {"f": lambda *values: 0}, variables={"a": True, "b": False}, slice_budget=10_000)
+    interpreter.step()
+    assert interpreter.status is not Status.RUNNING
 
 
 @pytest.mark.parametrize(

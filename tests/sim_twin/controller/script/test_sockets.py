@@ -119,7 +119,10 @@ def test_an_address_that_would_have_to_be_looked_up_is_refused_at_once(address):
 
 
 def test_a_peer_that_hangs_up_ends_the_read_after_what_it_sent():
-    with session(f'{OPEN}note(socket_read_line())\nnote(socket_read_line())\nnote(socket_send_line("a"))') as (run, server):
+    with session(f'{OPEN}note(socket_read_line())\nnote(socket_read_line())\nnote(socket_send_line("a"))') as (
+        run,
+        server,
+    ):
         with connected(run, server) as peer:
             peer.sendall(b"last\nhalf")
         run.finish(500)

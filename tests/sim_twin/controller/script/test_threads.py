@@ -105,7 +105,9 @@ def test_kill_lets_the_motion_of_the_thread_clean_up():
 
 
 def test_kill_of_no_thread_and_of_an_ended_one_does_nothing():
-    assert schedule('kill 0\nthread t():\n x = 1\n end\n h = run t()\n sync()\n kill h\n kill h\n note("on")') == [(2, "on")]
+    assert schedule('kill 0\nthread t():\n x = 1\n end\n h = run t()\n sync()\n kill h\n kill h\n note("on")') == [
+        (2, "on")
+    ]
 
 
 def test_a_thread_may_kill_itself():
