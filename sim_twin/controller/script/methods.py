@@ -3,7 +3,7 @@
 from collections.abc import Callable
 
 from sim_twin.controller.script.errors import ScriptRuntimeError
-from sim_twin.controller.script.values import Value, copied, described
+from sim_twin.controller.script.values import MAX_ELEMENTS, ScriptStruct, Value, copied, described
 
 __all__ = ["call_method"]
 
@@ -20,17 +20,20 @@ def call_method(owner: Value, name: str, *arguments: Value) -> Value:
 
 
 def _append(owner: list[Value], value: Value) -> None:
-    owner.append(copied(value))
+    _insert(owner, len(owner), value)
 
 
 def _extend(owner: list[Value], values: Value) -> None:
     if type(values) is not list:
         raise ScriptRuntimeError(f"extend() expects a list, got {described(values)}")
-    owner.extend([copied(value) for value in values])
+    for value in [copied(value) for value in values]:
+        _append(owner, value)
 
 
 def _insert(owner: list[Value], index: Value, value: Value) -> None:
     owner.insert(_place(owner, index, "insert", last=len(owner)), copied(value))
+    if len(owner) > MAX_ELEMENTS or type(value) in (list, ScriptStruct):
+        copied(owner)  # refuses what has become too long
 
 
 def _remove(owner: list[Value], index: Value) -> None:

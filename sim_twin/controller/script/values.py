@@ -7,6 +7,7 @@ from sim_twin.controller.pose import Pose
 from sim_twin.controller.script.errors import ScriptRuntimeError
 
 __all__ = [
+    "MAX_ELEMENTS",
     "ScriptStruct",
     "Value",
     "copied",
@@ -23,7 +24,7 @@ __all__ = [
 Value: TypeAlias = Union[bool, int, float, str, Pose, "list[Value]", "ScriptStruct", None]
 
 
-_MAX_ELEMENTS = 10_000
+MAX_ELEMENTS = 10_000
 _MAX_CHARACTERS = 65_536
 
 
@@ -47,7 +48,7 @@ def copied(value: Value) -> Value:
     Everything that grows passes here, so here is where a list of lists that doubles at every turn comes to its end.
     """
     if type(value) is list or type(value) is ScriptStruct:
-        return _copied(value, [_MAX_ELEMENTS])
+        return _copied(value, [MAX_ELEMENTS])
     return value
 
 
@@ -55,7 +56,7 @@ def _copied(value: Value, room: list[int]) -> Value:
     if type(value) is list:
         room[0] -= len(value)
         if room[0] < 0:
-            raise ScriptRuntimeError(f"the list is too long, expected at most {_MAX_ELEMENTS} elements in all")
+            raise ScriptRuntimeError(f"the list is too long, expected at most {MAX_ELEMENTS} elements in all")
         return [_copied(part, room) if type(part) in (list, ScriptStruct) else part for part in value]
     if type(value) is ScriptStruct:
         return ScriptStruct({name: _copied(part, room) for name, part in value.members.items()})

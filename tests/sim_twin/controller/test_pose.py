@@ -44,8 +44,8 @@ def rodrigues(rotvec):
     if angle == 0:
         return np.eye(3)
     x, y, z = np.asarray(rotvec) / angle
-    K = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-    return np.eye(3) + math.sin(angle) * K + (1 - math.cos(angle)) * K @ K
+    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    return np.eye(3) + math.sin(angle) * cross + (1 - math.cos(angle)) * cross @ cross
 
 
 def assert_same_frame(first, second):

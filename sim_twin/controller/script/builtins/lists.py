@@ -3,12 +3,11 @@
 from sim_twin.controller.script.arithmetic import int32
 from sim_twin.controller.script.builtins.arguments import flag, integer, text, values
 from sim_twin.controller.script.code import Builtins
-from sim_twin.controller.script.values import Value, copied, described, joined, text_of
+from sim_twin.controller.script.values import MAX_ELEMENTS, Value, copied, described, joined, text_of
 
 __all__ = ["LISTS"]
 
 _N_BITS = 32
-_N_ELEMENTS_MAX = 10_000
 
 
 def _length(v: Value) -> Value:
@@ -26,8 +25,8 @@ def _make_list(length: Value, initial_value: Value, capacity: Value = None) -> V
     n = integer(length)
     if n < 0 or (capacity is not None and integer(capacity) < n):
         raise ValueError(f"expected a length of 0 up to the capacity, got {n}")
-    if n > _N_ELEMENTS_MAX:
-        raise ValueError(f"expected a length of at most {_N_ELEMENTS_MAX}, got {n}")
+    if n > MAX_ELEMENTS:
+        raise ValueError(f"expected a length of at most {MAX_ELEMENTS}, got {n}")
     return [copied(initial_value) for _ in range(n)]
 
 

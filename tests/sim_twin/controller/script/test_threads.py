@@ -256,7 +256,8 @@ def test_two_sections_never_overlap():
 
 def test_nobody_starves_while_two_threads_share_a_section():
     section = "while True:\n enter_critical\n note({})\n sync()\n exit_critical\n end"
-    body = f"thread a():\n {section.format(1)}\n end\n thread b():\n {section.format(2)}\n end\n run a()\n run b()\n sleep(0.04)"
+    threads = [f"thread t{n}():\n {section.format(n)}\n end\n run t{n}()\n" for n in (1, 2)]
+    body = f"{''.join(threads)}sleep(0.04)"
     notes = [note for _, note in schedule(body)]
     assert abs(notes.count(1) - notes.count(2)) <= 1
 
