@@ -185,3 +185,21 @@ def test_the_line_of_the_main_thread_can_be_read_while_others_run():
 def test_an_interpreter_needs_no_builtins():
     interpreter = Interpreter(parse_program("def p():\n x = 1\nend"), {})
     assert interpreter.step() is Status.FINISHED
+
+
+def test_the_line_after_a_wait_is_the_threads_own():
+    text = 'def prog():\n thread t():\n  while True:\n   sync()\n  end\n end\n run t()\n x = move("m", 3) + 1\nend'
+    assert error_of(text)[1] == 8
+
+
+def test_after_a_call_that_took_time_the_line_is_the_callers_again():
+    text = "def prog():\n def f():\n  sync()\n  return 1\n end\n x = f() + missing\nend"
+    assert error_of(text)[1] == 6
+
+
+def test_a_variable_assigned_before_its_global_exists_is_not_that_global():
+    message, line = error_of(
+        "def prog():\n def f():\n  a = 1\n end\n def g():\n  note(a)\n end\n f()\n g()\n a = 5\nend"
+    )
+    assert "'a' has no value yet" in message
+    assert line == 6

@@ -26,9 +26,10 @@ def parse_or_refuse(text):
     """Parse, and hold the refusal to its word: a place inside the text."""
     try:
         parse_program(text)
-        return
     except ScriptSyntaxError as caught:
         error = caught
+    else:
+        return
     lines = text.split("\n")
     assert 1 <= error.line <= len(lines)
     assert 1 <= error.column <= len(lines[error.line - 1]) + 1
@@ -72,6 +73,7 @@ def test_a_program_with_a_piece_cut_out_parses_or_is_refused(data):
         lambda n: "x = 1" + " + 1" * n,
         lambda n: "x = " + "(" * min(n, 30) + "1" + " + 1" * n + ")" * min(n, 30),
         lambda n: "x = " + "(" * min(n, 30) + "1" + (" + 1" * 50 + ")") * min(n, 30),
+        lambda n: "x = " + "(" * min(n, 30) + "1" + (" + 1" * 50 + " or 1)") * min(n, 30),
         lambda n: "x = True" + " or True and False" * n,
         lambda n: "x = a" + "[0]" * n,
         lambda n: "x = a" + ".b" * n,

@@ -278,3 +278,80 @@ def test_textmsg_joins_two_values_as_text():
     run = ScriptRun(program('textmsg("at ", p[1, 2, 3, 0, 0, 0.5])\ntextmsg([1, True])')).finish()
     assert run.log.lines == ["at p[1, 2, 3, 0, 0, 0.5]", "[1, True]"]
     assert run.interpreter.status is Status.FINISHED
+
+
+def test_who_was_held_off_comes_before_who_only_now_wants_to_enter():
+    body = """
+    thread a():
+        enter_critical
+        sync()
+        exit_critical
+        sync()
+    end
+    thread b():
+        enter_critical
+        note("b")
+        exit_critical
+    end
+    run a()
+    run b()
+    sync()
+    enter_critical
+    note("main")
+    exit_critical
+    sync()
+    """
+    # In slice 2 main is held off until a opens the section; b comes to it next but lets main go first.
+    assert schedule(body) == [(2, "main"), (2, "b")]
+
+
+def test_a_loop_with_time_in_it_may_be_broken_and_what_follows_runs():
+    first = 'while True:\n sync()\n break\n end\n note("after")'
+    second = 'while True:\n sync()\n note("on")\n sync()\n break\n end\n note("last")'
+    body = f"{first}\n{second}"
+    assert schedule(body) == [(2, "after"), (3, "on"), (4, "last")]
+
+
+def test_the_depth_of_calls_is_each_threads_own():
+    body = """
+    def down(n):
+        if n > 0:
+            down(n - 1)
+        else:
+            sync()
+            sync()
+        end
+    end
+    thread t():
+        down(40)
+    end
+    run t()
+    run t()
+    down(40)
+    note("up")
+    """
+    assert schedule(body) == [(3, "up")]
+
+
+def test_a_function_may_be_called_more_often_than_calls_may_be_open():
+    body = """
+    def f():
+        sync()
+    end
+    def g():
+        x = 1
+    end
+    i = 0
+    while i < 60:
+        f()
+        g()
+        i = i + 1
+    end
+    note(i)
+    """
+    assert ScriptRun(program(body)).finish().by_slice == [(61, 60)]
+
+
+def test_a_default_that_takes_time_takes_it():
+    body = "def waited():\n sync()\n return 2\n end\n def f(a=waited()):\n return a\n end\n note(f())\n note(f(3))"
+    assert schedule(body) == [(2, 2), (2, 3)]
