@@ -2,7 +2,8 @@
 
 A slice is one control period, 500 a second on a robot. In each, every live thread runs in the order in which the
 threads were started until it takes time, waits or ends. A critical section holds the other threads off, over slices
-too; when it opens, whoever was held off still gets its turn in the same slice, before the section closes again.
+too; when it opens, whoever was held off gets its turn in the same slice, before the section closes again: scripts
+that leave a section only to enter it anew, as those of UR's own drivers do, would starve the others otherwise.
 """
 
 import enum
@@ -126,7 +127,7 @@ class Scheduler:
 
     @property
     def is_contended(self) -> bool:
-        """Whether a thread that the critical section held off in this slice still waits for its turn."""
+        """Whether a thread that the critical section held off, in this slice or before, still waits for its turn."""
         return bool(self._held_off)
 
     def enter(self) -> None:
@@ -146,7 +147,6 @@ class Scheduler:
         for thread in self._threads.values():
             thread.left = self._budget
         self._turn = turn = list(self._threads.values())
-        self._held_off.clear()
         self._n_started_in_slice = 0
         while turn:
             again, is_any_ahead = self._round(turn)

@@ -1,5 +1,9 @@
 """Each schedule is worked out by hand: (slice, what was noted in it)."""
 
+from functools import partial
+
+import pytest
+
 from sim_twin.controller.script import Status
 from tests.support.scripts import Log, ScriptRun, program
 
@@ -188,6 +192,30 @@ def test_a_section_entered_again_and_again_lets_the_held_off_pass_between():
     assert schedule(body) == [(1, "g"), (2, "m1"), (2, "g"), (3, "m2")]
 
 
+def test_whoever_stands_first_in_line_does_not_starve_the_later_by_its_sections():
+    body = """
+    thread later():
+        while True:
+            enter_critical
+            note("later")
+            sync()
+            exit_critical
+        end
+    end
+    run later()
+    i = 0
+    while i < 3:
+        enter_critical
+        note("main")
+        sync()
+        exit_critical
+        i = i + 1
+    end
+    """
+    # Slice 2: main opens, wants in again and gives way; slice 3: the other opens, gives way and main has the section.
+    assert schedule(body) == [(1, "main"), (2, "later"), (3, "main"), (4, "later"), (5, "main")]
+
+
 def test_sections_nest():
     body = """
     thread t():
@@ -355,3 +383,19 @@ def test_a_function_may_be_called_more_often_than_calls_may_be_open():
 def test_a_default_that_takes_time_takes_it():
     body = "def waited():\n sync()\n return 2\n end\n def f(a=waited()):\n return a\n end\n note(f())\n note(f(3))"
     assert schedule(body) == [(2, 2), (2, 3)]
+
+
+class Lift:
+    """Takes two slices, as a method, as an object and with an argument bound."""
+
+    def up(self, height=1):
+        yield
+        yield
+        return height
+
+    __call__ = up
+
+
+@pytest.mark.parametrize("builtin", [Lift().up, Lift(), partial(Lift().up, height=1)])
+def test_whatever_is_a_generator_when_called_may_take_time(builtin):
+    assert schedule("note(lift())", lift=builtin) == [(3, 1)]
