@@ -1,1 +1,1 @@
-"""A virtual Universal Robots controller: its wires, its script language and its states."""
+"""A virtual UR controller: what UR's interfaces say and obey, in front of the twin."""

@@ -1,0 +1,94 @@
+"""Functions of numbers, and the linear algebra of lists."""
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+
+from sim_twin.controller.pose import Pose, pose_inv
+from sim_twin.controller.script.arithmetic import int32
+from sim_twin.controller.script.builtins.arguments import matrix, number, numbers
+from sim_twin.controller.script.code import Builtins
+from sim_twin.controller.script.values import Value
+
+__all__ = ["MATHS"]
+
+
+def _of_one(function: Callable[[float], float]) -> Callable[[Value], Value]:
+    def apply(f: Value) -> Value:
+        return function(number(f))
+
+    return apply
+
+
+def _atan2(x: Value, y: Value) -> Value:
+    """Return the angle whose tangent is x/y: the first argument is the opposite side."""
+    return math.atan2(number(x), number(y))
+
+
+def _floor(f: Value) -> Value:
+    return int32(math.floor(number(f)))
+
+
+def _ceil(f: Value) -> Value:
+    return int32(math.ceil(number(f)))
+
+
+def _log(b: Value, f: Value) -> Value:
+    return math.log(number(f)) / math.log(number(b))
+
+
+def _pow(base: Value, exponent: Value) -> Value:
+    result = math.pow(number(base), number(exponent))
+    is_whole = type(base) is int and type(exponent) is int and exponent >= 0 and abs(result) <= 0x7FFF_FFFF
+    return int(result) if is_whole else result
+
+
+def _norm(a: Value) -> Value:
+    """Return a list's length as a vector, or a number's distance from zero."""
+    if type(a) is int or type(a) is float:
+        return abs(a)
+    return math.hypot(*numbers(a))
+
+
+def _transpose(m: Value) -> Value:
+    return [list(column) for column in zip(*matrix(m), strict=True)]
+
+
+def _inv(m: Value) -> Value:
+    if isinstance(m, Pose):
+        return pose_inv(m)
+    try:
+        return np.linalg.inv(np.array(matrix(m))).tolist()
+    except np.linalg.LinAlgError as error:
+        raise ValueError(f"expected a matrix that can be inverted: {error}") from error
+
+
+def _size(v: Value) -> Value:
+    if type(v) is not list:
+        raise TypeError("expected a list or a matrix")
+    if v and type(v[0]) is list:
+        return [len(v), len(v[0])]
+    return len(v)
+
+
+MATHS: Builtins = {
+    "acos": _of_one(math.acos),
+    "asin": _of_one(math.asin),
+    "atan": _of_one(math.atan),
+    "atan2": _atan2,
+    "ceil": _ceil,
+    "cos": _of_one(math.cos),
+    "d2r": _of_one(math.radians),
+    "floor": _floor,
+    "inv": _inv,
+    "log": _log,
+    "norm": _norm,
+    "pow": _pow,
+    "r2d": _of_one(math.degrees),
+    "sin": _of_one(math.sin),
+    "size": _size,
+    "sqrt": _of_one(math.sqrt),
+    "tan": _of_one(math.tan),
+    "transpose": _transpose,
+}

@@ -1,0 +1,231 @@
+"""Compiles calls: of the program's functions, of the host's builtins, and `run`."""
+
+import inspect
+from collections.abc import Callable, Generator, Mapping
+from types import GeneratorType
+
+from sim_twin.controller.script.code import Builtin, Code, Fast, Frame, Slow, applied
+from sim_twin.controller.script.context import Context, Routine, Scope, takes_time
+from sim_twin.controller.script.errors import ScriptRuntimeError
+from sim_twin.controller.script.syntax import Call, Definition, Expression, Run
+from sim_twin.controller.script.threads import Steps
+from sim_twin.controller.script.values import Value, copied
+
+__all__ = ["compile_call", "compile_run"]
+
+_MAX_DEPTH = 50  # of calls: Python's own stack must outlast them
+_BAD_ARGUMENTS = (TypeError, ValueError, LookupError, ArithmeticError)
+
+
+def compile_call(node: Call, scope: Scope, compiled: Callable[[Expression], Code[Value]]) -> Code[Value]:
+    """Compile a call; what is wrong with it shows when it runs, as on a robot.
+
+    Args:
+        node: The call.
+        scope: Where it stands.
+        compiled: Compiles an argument.
+    """
+    positional = [compiled(argument) for argument in node.positional]
+    keywords = {name: compiled(argument) for name, argument in node.keywords}
+    found = scope.find(node.name)
+    if found is not None:
+        definition, around = found
+        if definition.is_thread:
+            return _failing(f"'{node.name}' is a thread, start it with run {node.name}()")
+        routine = scope.context.routine(definition, around)
+        return _call_of_routine(node, scope.context, routine, _bound(definition, positional, keywords))
+    builtin = scope.context.builtins.get(node.name)
+    if builtin is None:
+        return _failing(f"the function '{node.name}' is not defined, neither in the program nor as a builtin")
+    mistake = _signature_mistake(scope.context.signature(node.name), len(positional), keywords)
+    if mistake:
+        return _failing(f"{node.name}(): {mistake}")
+    return _call_of_builtin(node, scope.context, builtin, positional, keywords)
+
+
+def compile_run(node: Run, scope: Scope) -> Code[Value]:
+    """Compile the start of a thread; its value is the handle."""
+    found = scope.find(node.name)
+    if found is None or not found[0].is_thread:
+        return _failing(f"expected the name of a thread after run, got '{node.name}'")
+    context = scope.context
+    routine = context.routine(*found)
+
+    def run(_: Frame) -> Value:
+        return context.scheduler.start(routine.definition.name, _work(routine))
+
+    return Fast(run)
+
+
+def _work(routine: Routine) -> Steps[object]:
+    if isinstance(routine.body, Slow):
+        yield from routine.body.run(routine.frame())
+    elif routine.body is not None:
+        routine.body.run(routine.frame())
+
+
+def _failing(message: str) -> Fast[Value]:
+    def run(_: Frame) -> Value:
+        raise ScriptRuntimeError(message)
+
+    return Fast(run)
+
+
+def _bound(
+    definition: Definition, positional: list[Code[Value]], keywords: Mapping[str, Code[Value]]
+) -> dict[str, Code[Value]] | str:
+    """Match arguments with parameters; return what is wrong, where something is."""
+    names = [parameter.name for parameter in definition.parameters]
+    if len(positional) > len(names):
+        return f"{definition.name}() takes {len(names)} arguments, got {len(positional)}"
+    bound = dict(zip(names, positional, strict=False))
+    for name, argument in keywords.items():
+        if name not in names:
+            return f"{definition.name}() has no parameter '{name}'"
+        if name in bound:
+            return f"{definition.name}() got the argument '{name}' twice"
+        bound[name] = argument
+    missing = [parameter.name for parameter in definition.parameters if parameter.default is None]
+    missing = [name for name in missing if name not in bound]
+    if missing:
+        return f"{definition.name}() misses the argument '{missing[0]}'"
+    return bound
+
+
+def _call_of_routine(
+    node: Call, context: Context, routine: Routine, bound: dict[str, Code[Value]] | str
+) -> Code[Value]:
+    if isinstance(bound, str):
+        return _failing(bound)
+    arguments = [(routine.scope.places[name], code) for name, code in bound.items()]
+    defaults = [
+        (routine.scope.places[parameter.name], parameter.name)
+        for parameter in routine.definition.parameters
+        if parameter.name not in bound
+    ]
+    if routine.definition.name in context.slow or any(isinstance(code, Slow) for _, code in arguments):
+        return _slow_call(node, context, routine, arguments, defaults)
+    fast = [(place, code.run) for place, code in arguments if isinstance(code, Fast)]
+    meter = context.meter
+
+    def call(frame: Frame) -> Value:
+        inner = routine.frame()
+        for place, argument in fast:
+            inner[place] = copied(argument(frame))
+        for place, name in defaults:
+            default = routine.defaults[name]
+            inner[place] = default.run(inner) if isinstance(default, Fast) else None
+        _open(context, routine)
+        body = routine.body
+        if isinstance(body, Fast):
+            body.run(inner)
+        meter.depth -= 1
+        meter.line = node.line
+        return inner[0]  # pyright: ignore[reportReturnType] - the first place is never unset
+
+    return Fast(call)
+
+
+def _slow_call(
+    node: Call,
+    context: Context,
+    routine: Routine,
+    arguments: list[tuple[int, Code[Value]]],
+    defaults: list[tuple[int, str]],
+) -> Code[Value]:
+    meter = context.meter
+
+    def call(frame: Frame) -> Steps[Value]:
+        inner = routine.frame()
+        for place, code in arguments:
+            inner[place] = copied((yield from code.run(frame)) if isinstance(code, Slow) else code.run(frame))
+        for place, name in defaults:
+            code = routine.defaults[name]
+            inner[place] = (yield from code.run(inner)) if isinstance(code, Slow) else code.run(inner)
+        _open(context, routine)
+        body = routine.body
+        if isinstance(body, Slow):
+            yield from body.run(inner)
+        elif body is not None:
+            body.run(inner)
+        meter.depth -= 1
+        meter.line = node.line
+        return inner[0]  # pyright: ignore[reportReturnType] - as above
+
+    return Slow(call)
+
+
+def _open(context: Context, routine: Routine) -> None:
+    meter = context.meter
+    meter.depth += 1
+    if meter.depth > _MAX_DEPTH:
+        name = routine.definition.name
+        raise ScriptRuntimeError(f"{name}() calls itself too deep, at most {_MAX_DEPTH} calls may be open")
+
+
+def _signature_mistake(
+    signature: inspect.Signature | None, n_positional: int, keywords: Mapping[str, Code[Value]]
+) -> str:
+    if signature is None:
+        return ""
+    try:
+        signature.bind(*[None] * n_positional, **dict.fromkeys(keywords))
+    except TypeError as error:
+        return str(error)
+    return ""
+
+
+def _call_of_builtin(
+    node: Call,
+    context: Context,
+    builtin: Builtin,
+    positional: list[Code[Value]],
+    keywords: Mapping[str, Code[Value]],
+) -> Code[Value]:
+    n_positional, names = len(positional), list(keywords)
+    meter = context.meter
+
+    def failed(error: Exception) -> ScriptRuntimeError:
+        meter.line = node.line
+        return ScriptRuntimeError(f"{node.name}(): {error}")
+
+    def result_of(*values: Value) -> "Value | Generator[None, None, Value]":
+        try:
+            if names:
+                given = map(copied, values[n_positional:])
+                return builtin(*map(copied, values[:n_positional]), **dict(zip(names, given, strict=True)))
+            return builtin(*map(copied, values))
+        except _BAD_ARGUMENTS as error:
+            raise failed(error) from error
+
+    operands = [*positional, *keywords.values()]
+    if takes_time(builtin):
+        return _slow_builtin(operands, result_of, failed)
+
+    def value_of(*values: Value) -> Value:
+        result = result_of(*values)
+        if isinstance(result, GeneratorType):
+            raise TypeError(f"builtin {node.name} returned a generator, so declare it as a generator function")
+        return result  # pyright: ignore[reportReturnType] - no generator, as tested
+
+    return applied(value_of, operands)
+
+
+def _slow_builtin(
+    operands: list[Code[Value]],
+    result_of: Callable[..., "Value | Generator[None, None, Value]"],
+    failed: Callable[[Exception], ScriptRuntimeError],
+) -> Code[Value]:
+    def run(frame: Frame) -> Steps[Value]:
+        values: list[Value] = []
+        for operand in operands:
+            values.append((yield from operand.run(frame)) if isinstance(operand, Slow) else operand.run(frame))  # noqa: PERF401 - none may yield
+        steps = result_of(*values)
+        if not isinstance(steps, Generator):
+            return steps
+        try:
+            return (yield from steps)
+        except _BAD_ARGUMENTS as error:
+            raise failed(error) from error
+
+    return Slow(run)

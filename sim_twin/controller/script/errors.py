@@ -1,0 +1,41 @@
+"""What can go wrong with a script: it does not parse, or it fails while it runs."""
+
+import msgspec
+
+__all__ = ["ScriptError", "ScriptFault", "ScriptRuntimeError", "ScriptSyntaxError"]
+
+
+class ScriptError(Exception):
+    """Anything wrong with a script; whoever wrote the script acts."""
+
+
+class ScriptSyntaxError(ScriptError):
+    """The text is not a program.
+
+    Attributes:
+        line: Where, counted from one.
+        column: Where on that line, counted from one.
+    """
+
+    def __init__(self, *, line: int, column: int, expected: str, got: str) -> None:
+        super().__init__(f"line {line}, column {column}: expected {expected}, got {got}")
+        self.line = line
+        self.column = column
+
+
+class ScriptRuntimeError(ScriptError):
+    """The running script did what a robot stops for; the interpreter knows the line."""
+
+
+class ScriptFault(msgspec.Struct, frozen=True, kw_only=True):
+    """Why a program ended before its end.
+
+    Attributes:
+        message: What was expected and what came.
+        line: The line that was being executed.
+        thread: The name of the thread that executed it; the program's own name for its main thread.
+    """
+
+    message: str
+    line: int
+    thread: str

@@ -1,0 +1,270 @@
+"""Compiles statements to closures, which return how they ended: None to go on, or a signal."""
+
+from collections.abc import Callable
+
+from sim_twin.controller.script.assignments import compile_assignment
+from sim_twin.controller.script.code import Code, Fast, Frame, Signal, Slow
+from sim_twin.controller.script.context import Routine, Scope
+from sim_twin.controller.script.errors import ScriptRuntimeError
+from sim_twin.controller.script.expressions import compile_expression
+from sim_twin.controller.script.syntax import (
+    Assign,
+    Critical,
+    Definition,
+    Evaluate,
+    Halt,
+    If,
+    Jump,
+    Return,
+    Statement,
+    ThreadAction,
+    While,
+)
+from sim_twin.controller.script.threads import ProgramHalted, Steps, Wait
+from sim_twin.controller.script.values import Value, copied, truth
+
+__all__ = ["compile_body", "compile_routine"]
+
+Ending = Signal | None
+
+
+def compile_body(scope: Scope) -> Code[Ending]:
+    """Compile the body of a function, a thread or the program."""
+    return _block(scope.body, scope)
+
+
+def compile_routine(routine: Routine) -> None:
+    """Compile a function or thread: its body and the defaults of its parameters."""
+    scope = routine.scope
+    for parameter in routine.definition.parameters:
+        if parameter.default is not None:
+            routine.defaults[parameter.name] = compile_expression(parameter.default, scope)
+    routine.body = compile_body(scope)
+
+
+def _block(body: tuple[Statement, ...], scope: Scope) -> Code[Ending]:
+    steps = [(node.line, _COMPILERS[type(node)](node, scope)) for node in body if not isinstance(node, Definition)]
+    fast = [(line, step.run) for line, step in steps if isinstance(step, Fast)]
+    if len(fast) < len(steps):
+        return _slow_block(steps, scope)
+    meter, cost = scope.context.meter, len(steps)
+
+    def run(frame: Frame) -> Ending:
+        meter.left -= cost
+        if meter.left < 0:
+            _exhausted(scope)
+        for line, step in fast:
+            meter.line = line
+            signal = step(frame)
+            if signal is not None:
+                return signal
+        return None
+
+    return Fast(run)
+
+
+def _slow_block(steps: list[tuple[int, Code[Ending]]], scope: Scope) -> Code[Ending]:
+    meter, cost = scope.context.meter, len(steps)
+
+    def run(frame: Frame) -> Steps[Ending]:
+        meter.left -= cost
+        if meter.left < 0:
+            _exhausted(scope)
+        for line, step in steps:
+            meter.line = line
+            signal = (yield from step.run(frame)) if isinstance(step, Slow) else step.run(frame)
+            if signal is not None:
+                return signal
+        return None
+
+    return Slow(run)
+
+
+def _exhausted(scope: Scope) -> None:
+    running = scope.context.scheduler.running
+    name = running.name if running is not None else "main"
+    raise ScriptRuntimeError(
+        f"the thread '{name}' used too much time in one slice, is this an infinite loop? Put sync() or sleep() into it"
+    )
+
+
+def _assign(node: Assign, scope: Scope) -> Code[Ending]:
+    return compile_assignment(node, scope)
+
+
+def _evaluate(node: Evaluate, scope: Scope) -> Code[Ending]:
+    code = compile_expression(node.expression, scope)
+    if isinstance(code, Fast):
+        evaluate = code.run
+
+        def run(frame: Frame) -> Ending:
+            evaluate(frame)
+            return None
+
+        return Fast(run)
+    evaluate_slowly = code.run
+
+    def run_slowly(frame: Frame) -> Steps[Ending]:
+        yield from evaluate_slowly(frame)
+        return None
+
+    return Slow(run_slowly)
+
+
+def _if(node: If, scope: Scope) -> Code[Ending]:
+    branches = [(line, compile_expression(test, scope), _block(body, scope)) for line, test, body in node.branches]
+    otherwise = _block(node.otherwise, scope)
+    fast = [
+        (line, test.run, block.run)
+        for line, test, block in branches
+        if isinstance(test, Fast) and isinstance(block, Fast)
+    ]
+    meter = scope.context.meter
+    if len(fast) == len(branches) and isinstance(otherwise, Fast):
+        last = otherwise.run
+
+        def run(frame: Frame) -> Ending:
+            for line, test, block in fast:
+                meter.line = line
+                value = test(frame)
+                if value if value is True or value is False else truth(value):
+                    return block(frame)
+            return last(frame)
+
+        return Fast(run)
+
+    def run_slowly(frame: Frame) -> Steps[Ending]:
+        chosen: Code[Ending] = otherwise
+        for line, test, block in branches:
+            meter.line = line
+            value = (yield from test.run(frame)) if isinstance(test, Slow) else test.run(frame)
+            if value if value is True or value is False else truth(value):
+                chosen = block
+                break
+        return (yield from chosen.run(frame)) if isinstance(chosen, Slow) else chosen.run(frame)
+
+    return Slow(run_slowly)
+
+
+def _while(node: While, scope: Scope) -> Code[Ending]:
+    test, block = compile_expression(node.condition, scope), _block(node.body, scope)
+    meter, line = scope.context.meter, node.line
+
+    def begin_round() -> None:
+        meter.line = line
+        meter.left -= 1
+        if meter.left < 0:
+            _exhausted(scope)
+
+    if isinstance(test, Fast) and isinstance(block, Fast):
+        return _fast_while(test.run, block.run, begin_round)
+
+    def run(frame: Frame) -> Steps[Ending]:
+        while True:
+            begin_round()
+            if not truth((yield from test.run(frame)) if isinstance(test, Slow) else test.run(frame)):
+                return None
+            signal = (yield from block.run(frame)) if isinstance(block, Slow) else block.run(frame)
+            if signal is Signal.RETURN:
+                return signal
+            if signal is Signal.BREAK:
+                return None
+
+    return Slow(run)
+
+
+def _fast_while(
+    test: Callable[[Frame], Value], block: Callable[[Frame], Ending], begin_round: Callable[[], None]
+) -> Code[Ending]:
+    def run(frame: Frame) -> Ending:
+        while True:
+            begin_round()
+            if not truth(test(frame)):
+                return None
+            signal = block(frame)
+            if signal is Signal.RETURN:
+                return signal
+            if signal is Signal.BREAK:
+                return None
+
+    return Fast(run)
+
+
+def _jump(node: Jump, _: Scope) -> Code[Ending]:
+    signal = Signal.BREAK if node.word == "break" else Signal.CONTINUE
+    return Fast(lambda _: signal)
+
+
+def _return(node: Return, scope: Scope) -> Code[Ending]:
+    if node.value is None:
+        return Fast(lambda _: Signal.RETURN)
+    code = compile_expression(node.value, scope)
+
+    def run(frame: Frame) -> Ending:
+        if isinstance(code, Fast):
+            frame[0] = copied(code.run(frame))
+        return Signal.RETURN
+
+    def run_slowly(frame: Frame) -> Steps[Ending]:
+        if isinstance(code, Slow):
+            frame[0] = copied((yield from code.run(frame)))
+        return Signal.RETURN
+
+    return Slow(run_slowly) if isinstance(code, Slow) else Fast(run)
+
+
+def _thread_action(node: ThreadAction, scope: Scope) -> Code[Ending]:
+    handle = compile_expression(node.handle, scope)
+    scheduler = scope.context.scheduler
+
+    def run(frame: Frame) -> Steps[Ending]:
+        value = (yield from handle.run(frame)) if isinstance(handle, Slow) else handle.run(frame)
+        if node.word == "kill":
+            scheduler.kill(value)
+            return None
+        while scheduler.is_alive(value):
+            yield Wait.JOIN
+        return None
+
+    def kill(frame: Frame) -> Ending:
+        if isinstance(handle, Fast):
+            scheduler.kill(handle.run(frame))
+        return None
+
+    return Fast(kill) if node.word == "kill" and isinstance(handle, Fast) else Slow(run)
+
+
+def _critical(node: Critical, scope: Scope) -> Code[Ending]:
+    scheduler = scope.context.scheduler
+
+    def enter(_: Frame) -> Steps[Ending]:
+        if scheduler.is_contended:
+            yield Wait.GIVE_WAY
+        scheduler.enter()
+        return None
+
+    def leave(_: Frame) -> Ending:
+        scheduler.leave()
+        return None
+
+    return Slow(enter) if node.is_enter else Fast(leave)
+
+
+def _halt(_: Halt, __: Scope) -> Code[Ending]:
+    def run(_: Frame) -> Ending:
+        raise ProgramHalted
+
+    return Fast(run)
+
+
+_COMPILERS: dict[type, Callable[..., Code[Ending]]] = {
+    Assign: _assign,
+    Evaluate: _evaluate,
+    If: _if,
+    While: _while,
+    Jump: _jump,
+    Return: _return,
+    ThreadAction: _thread_action,
+    Critical: _critical,
+    Halt: _halt,
+}

@@ -1,0 +1,207 @@
+"""Threads in physical slices: who runs in this slice, who waits, who holds the critical section.
+
+A slice is one control period, 500 a second on a robot. In each, every live thread runs in the order in which the
+threads were started until it takes time, waits or ends. A critical section holds the other threads off, over slices
+too; when it opens, whoever was held off gets its turn in the same slice, before the section closes again: scripts
+that leave a section only to enter it anew, as those of UR's own drivers do, would starve the others otherwise.
+"""
+
+import enum
+from collections.abc import Generator
+from typing import TypeAlias, TypeVar
+
+from sim_twin.controller.script.errors import ScriptRuntimeError
+from sim_twin.controller.script.values import Value
+
+__all__ = ["Meter", "ProgramHalted", "Scheduler", "Steps", "Thread", "Wait"]
+
+T = TypeVar("T")
+
+
+_MAX_THREADS = 100
+
+
+class Wait(enum.Enum):
+    """Why a thread pauses without taking time; a plain yield of None takes the rest of its slice."""
+
+    JOIN = 0
+    GIVE_WAY = 1
+
+
+Steps: TypeAlias = Generator["Wait | None", None, T]
+
+
+class ProgramHalted(Exception):  # noqa: N818 - no error: the script says halt
+    """The script ended itself."""
+
+
+class _ThreadEnded(Exception):  # noqa: N818 - no error: a thread killed itself
+    """The running thread ended itself."""
+
+
+class Meter:
+    """What the running thread has used: read and written by compiled code, so plain attributes.
+
+    Attributes:
+        line: The line being executed.
+        left: How many operations the thread may still execute in this slice.
+        depth: How many calls are open.
+    """
+
+    __slots__ = ("depth", "left", "line")
+
+    def __init__(self) -> None:
+        self.line = 0
+        self.left = 0
+        self.depth = 0
+
+
+class Thread:
+    """One thread: its work as a generator, and its side of the meter while another runs."""
+
+    __slots__ = ("depth", "is_alive", "left", "line", "name", "work")
+
+    def __init__(self, name: str, work: Steps[object], budget: int) -> None:
+        self.name = name
+        self.work = work
+        self.left = budget
+        self.line = self.depth = 0
+        self.is_alive = True
+
+
+class Scheduler:
+    """Owns the threads of one program.
+
+    Attributes:
+        running: The thread that runs now, or ran last.
+    """
+
+    def __init__(self, meter: Meter, *, slice_budget: int, may_take_time: bool) -> None:
+        self._meter = meter
+        self._budget = slice_budget
+        self._may_take_time = may_take_time
+        self._threads: dict[int, Thread] = {}  # live ones, in the order of their start
+        self._n_started = self._n_started_in_slice = 0
+        self._turn: list[Thread] = []
+        self._main: Thread | None = None
+        self._holder: Thread | None = None
+        self._n_entered = 0
+        self._held_off: set[Thread] = set()
+        self.running: Thread | None = None
+
+    def start(self, name: str, work: Steps[object]) -> int:
+        """Add a thread, which gets its first turn in this slice, and return its handle."""
+        self._n_started_in_slice += 1
+        if max(self._n_started_in_slice, len(self._threads)) > _MAX_THREADS:
+            raise ScriptRuntimeError(f"run {name}: expected at most {_MAX_THREADS} threads, and starts in one slice")
+        self._n_started += 1
+        thread = Thread(name, work, self._budget)
+        self._threads[self._n_started] = thread
+        self._turn.append(thread)
+        return self._n_started
+
+    def start_main(self, name: str, work: Steps[object]) -> Thread:
+        """Add the thread with which the program ends."""
+        self._main = self._threads[self.start(name, work)]
+        return self._main
+
+    def kill(self, handle: Value) -> None:
+        """End a thread; a handle of a thread that is no more, and 0, which names none, are let pass."""
+        thread = self._thread(handle, "kill")
+        if thread is None:
+            return
+        if thread is self.running:
+            raise _ThreadEnded
+        thread.work.close()
+        self._end(thread)
+
+    def is_alive(self, handle: Value) -> bool:
+        """Return whether the thread has not ended."""
+        return self._thread(handle, "join") is not None
+
+    def stop(self) -> None:
+        """End all threads."""
+        for thread in list(self._threads.values()):
+            thread.work.close()
+            self._end(thread)
+
+    @property
+    def is_contended(self) -> bool:
+        """Whether a thread that the critical section held off, in this slice or before, still waits for its turn."""
+        return bool(self._held_off)
+
+    def enter(self) -> None:
+        """Hold the other threads off; sections nest."""
+        self._holder = self.running
+        self._n_entered += 1
+
+    def leave(self) -> None:
+        """Leave one section; without one there is nothing to leave."""
+        if self._holder is self.running and self._n_entered:
+            self._n_entered -= 1
+            if not self._n_entered:
+                self._holder = None
+
+    def step(self) -> None:
+        """Run one slice, or as much of it as there is before the main thread ends."""
+        for thread in self._threads.values():
+            thread.left = self._budget
+        self._turn = turn = list(self._threads.values())
+        self._n_started_in_slice = 0
+        while turn:
+            again, is_any_ahead = self._round(turn)
+            if not is_any_ahead:
+                return
+            self._turn = turn = again
+
+    def _round(self, turn: list[Thread]) -> tuple[list[Thread], bool]:
+        """Give each its turn; return who could not use it, and whether anybody did."""
+        again: list[Thread] = []
+        is_any_ahead = False
+        for thread in turn:  # grows while threads are started
+            if not thread.is_alive:
+                continue
+            if self._holder is not None and self._holder is not thread:
+                self._held_off.add(thread)
+                again.append(thread)
+                continue
+            self._held_off.discard(thread)
+            wait = self._advance(thread)
+            if wait is not None:
+                again.append(thread)
+            is_any_ahead |= wait is not Wait.JOIN
+            if self._main is not None and not self._main.is_alive:
+                return [], False
+        return again, is_any_ahead
+
+    def _advance(self, thread: Thread) -> Wait | None:
+        meter = self._meter
+        meter.line, meter.left, meter.depth = thread.line, thread.left, thread.depth
+        self.running = thread
+        try:
+            wait = thread.work.send(None)
+        except (StopIteration, _ThreadEnded):
+            self._end(thread)
+            return None
+        finally:
+            thread.line, thread.left, thread.depth = meter.line, meter.left, meter.depth
+        if isinstance(wait, Wait):
+            return wait
+        if not self._may_take_time:
+            raise ScriptRuntimeError(
+                "a secondary program may not take physical time: no sync, sleep or motion in a sec"
+            )
+        return None
+
+    def _thread(self, handle: Value, word: str) -> Thread | None:
+        if type(handle) is not int:
+            raise ScriptRuntimeError(f"expected a thread's handle after {word}, as run returns it")
+        return self._threads.get(handle)
+
+    def _end(self, thread: Thread) -> None:
+        thread.is_alive = False
+        self._threads = {handle: other for handle, other in self._threads.items() if other is not thread}
+        self._held_off.discard(thread)
+        if self._holder is thread:
+            self._holder = None
+            self._n_entered = 0
