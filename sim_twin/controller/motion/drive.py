@@ -27,8 +27,12 @@ from sim_twin.plant import TwinWorld
 
 __all__ = ["Measured", "TwinDrive", "servo_lag_s"]
 
-BRAKE_NM = np.array([110.0, 110.0, 110.0, 25.0, 25.0, 25.0])
-"""Holding and stopping torque of the brakes; see the test of a category 0 stop."""
+BRAKE_NM = np.array([60.0, 35.0, 24.0, 6.0, 6.0, 6.0])
+"""Torque of brakes that stop a moving arm: with the twin's own tool its distances are those that UR publishes for the
+CB3 UR5's category 0 stop (see core.STOP_RAD_S2)."""
+HOLD_NM = np.array([150.0, 150.0, 150.0, 28.0, 28.0, 28.0])
+"""Torque of brakes that hold a standing one."""
+HELD_RAD_S = 0.005
 N_HISTORY = 1000
 
 
@@ -80,9 +84,7 @@ class TwinDrive:
         self, world: TwinWorld, *, kinematics: ArmKinematics | None = None, limits: SafetyLimits | None = None
     ) -> None:
         if abs(world.tick_s - SLICE_S) > 1e-12:
-            raise ValueError(
-                f"twin's rig: expected tick_s {SLICE_S}, got {world.tick_s}; set tick_s and physics_s to it"
-            )
+            raise ValueError(f"twin's rig: expected tick_s {SLICE_S}, got {world.tick_s}; set it so in the rig")
         self.world = world
         self.kinematics = kinematics or ArmKinematics(dh_rows(world.arm))
         self.limits = limits or default_limits(world.arm)
@@ -175,6 +177,8 @@ class TwinDrive:
         data = self.world.data
         if self.is_braked:
             data.ctrl[self._controls] = data.qpos[:6]
+            if float(np.abs(data.qvel[:6]).max()) < HELD_RAD_S:
+                self.world.model.dof_frictionloss[:6] = HOLD_NM
             self.core.hold(data.qpos[:6].copy())
         else:
             data.ctrl[self._controls] = self.motions.setpoint.q_target

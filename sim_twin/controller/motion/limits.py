@@ -33,7 +33,7 @@ class Cause(Enum):
     are recalled from its list of error codes.
     """
 
-    NOT_FINITE = (204, 1, False)
+    NOT_FINITE = (204, 0, False)
     JUMP = (204, 1, False)
     TARGET_SPEED = (204, 2, False)
     JOINT_LIMIT = (150, 0, False)
@@ -140,9 +140,7 @@ def breach_asked(limits: SafetyLimits, asked: Asked) -> Breach | None:
         return _breach(Cause.JUMP, i, f"target jumped by {jump:.3f} rad in one slice; send nearer targets")
     i = _first(speed - np.multiply(limits.speed_rad_s, 1.0 + 1e-9))
     if i is not None:
-        return _breach(
-            Cause.TARGET_SPEED, i, f"target moves at {speed[i]:.2f} rad/s, limit {limits.speed_rad_s[i]:.2f}"
-        )
+        return _breach(Cause.TARGET_SPEED, i, f"target moves at {speed[i]:.2f} rad/s, beyond its limit")
     i = _beyond(asked.q_rad, limits, 0.0)
     if i is not None:
         return _breach(Cause.JOINT_LIMIT, i, f"target {asked.q_rad[i]:.3f} rad is beyond the joint's limit")

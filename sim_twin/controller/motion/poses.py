@@ -5,6 +5,7 @@ Rotations are 3x3 arrays inside; a UR pose is six numbers (x, y, z, rx, ry, rz).
 
 import math
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,7 +23,7 @@ __all__ = [
     "vec6",
 ]
 
-Array = NDArray[np.float64]
+Array = NDArray[np.floating[Any]]
 TINY = 1e-12
 
 
