@@ -12,7 +12,7 @@ import msgspec
 import numpy as np
 
 from config.arm import ArmConfig
-from sim_twin.controller.motion.poses import Array, between, inverse, matrix_from_pose, pose_from_matrix
+from sim_twin.controller.motion.poses import Array, between, inverse, matrix_from_pose, pose_from_matrix, vec6
 
 __all__ = [
     "ArmKinematics",
@@ -167,10 +167,14 @@ class ArmKinematics:
         Raises:
             NoSolutionError: the pose is out of reach.
         """
-        near = np.asarray(q_near, dtype=np.float64)
+        near = vec6(q_near)
         T_ft = None if tcp is None else matrix_from_pose(tcp)
-        T_bt = matrix_from_pose(pose)
+        T_bt = matrix_from_pose(vec6(pose, "pose"))
         found = [_nearest_turn(q, near) for q in self.solutions(T_bt, T_ft, q6_free_rad=float(near[5]))]
+        if not self._is_nominal:
+            # Near its own reach, a calibrated arm goes where the nominal one does not.
+            by_neighbour = self._refined(T_bt if T_ft is None else T_bt @ inverse(T_ft), near)
+            found += [] if by_neighbour is None else [by_neighbour]
         if not found:
             raise NoSolutionError(f"inverse kinematics: no joint angles bring the tool to {np.round(pose, 4).tolist()}")
         best = min(found, key=lambda q: float(np.square(q - near).sum()))
