@@ -91,6 +91,7 @@ class MotionCore:
         self.pace = Pace()
         self.T_ft = np.eye(4)
         self.tail: Tail | None = None
+        self._stop_tail: Tail | None = None
         self.nominal_rad = setpoint.q_target
         self._nominal_before = setpoint.q_target
         self._shift = np.zeros(6)
@@ -252,7 +253,12 @@ class MotionCore:
         speed = self.begin_free()
         self._n_stops += 1
         self._law, self._free_axes = None, None
-        self.tail = Tail(self._stopping(speed))
+        self.tail = self._stop_tail = Tail(self._stopping(speed))
+
+    @property
+    def is_stopping(self) -> bool:
+        """A stop is on its way: it is never refused."""
+        return self.tail is not None and self.tail is self._stop_tail
 
     @property
     def n_stops(self) -> int:

@@ -27,12 +27,14 @@ from sim_twin.plant import TwinWorld
 
 __all__ = ["Measured", "TwinDrive", "servo_lag_s"]
 
-BRAKE_NM = np.array([60.0, 35.0, 24.0, 6.0, 6.0, 6.0])
+BRAKE_NM = np.array([60.0, 35.0, 20.5, 6.0, 6.0, 6.0])
 """Torque of brakes that stop a moving arm: with the twin's own tool its distances are those that UR publishes for the
 CB3 UR5's category 0 stop (see core.STOP_RAD_S2)."""
 HOLD_NM = np.array([150.0, 150.0, 150.0, 28.0, 28.0, 28.0])
 """Torque of brakes that hold a standing one."""
 HELD_RAD_S = 0.005
+BRAKE_SOLIMP = (0.9999, 0.9999)
+"""A brake that hardly creeps; MuJoCo's own friction gives way in proportion to the load."""
 N_HISTORY = 1000
 
 
@@ -120,6 +122,7 @@ class TwinDrive:
         model.actuator_gainprm[self._controls] = 0.0
         model.actuator_biasprm[self._controls] = 0.0
         model.dof_frictionloss[:6] = BRAKE_NM
+        model.dof_solimp[:6, :2] = BRAKE_SOLIMP
         self.is_braked = True
         self._seat()
 
@@ -206,18 +209,30 @@ class TwinDrive:
 
     def _drive(self) -> Breach | None:
         core, setpoint = self.core, self.motions.setpoint
+        before_m = self._asked_tool_m()
         try:
             core.end_slice(self.measured)
         except KinematicsError as error:
             core.refuse(self.measured, is_moved=False)
             return Breach(cause=Cause.SINGULARITY, text=str(error))
-        tool_m = core.tool_at(setpoint.q_target)[:3, 3] if self.limits.planes else np.zeros(3)
-        breach = breach_asked(self.limits, Asked(q_rad=setpoint.q_target, qd_rad_s=setpoint.qd_target, tool_m=tool_m))
+        breach = None
+        if not core.is_stopping:
+            asked = Asked(
+                q_rad=setpoint.q_target,
+                qd_rad_s=setpoint.qd_target,
+                tool_m=self._asked_tool_m(),
+                tool_before_m=before_m,
+            )
+            breach = breach_asked(self.limits, asked)
         if breach is not None:
             core.refuse(self.measured)
         # A first-order lag of the set-points: where the servo should have brought the joints by now.
         self._expected = self._expected + SLICE_S / (SLICE_S + self._lag_s) * (setpoint.q_target - self._expected)
         return breach
+
+    def _asked_tool_m(self) -> Array:
+        """Where the set-point brings the tool; of no interest where there is no plane."""
+        return self.core.tool_at(self.motions.setpoint.q_target)[:3, 3] if self.limits.planes else np.zeros(3)
 
     def _felt(self) -> Felt:
         now = self.measured

@@ -11,7 +11,7 @@ from sim_twin.controller.motion.poses import Array, matrix_from_pose
 
 __all__ = ["ForceKind", "ForceLaw", "ForceTask", "task_axes"]
 
-SPEED_PER_FORCE = (0.001, 0.001, 0.001, 0.04, 0.04, 0.04)
+SPEED_PER_FORCE = (0.0006, 0.0006, 0.0006, 0.03, 0.03, 0.03)
 """m/s per N and rad/s per Nm at gain scaling 1: slow enough for the fingertips' 8 N/mm behind 35 ms of lag."""
 SMOOTHING_S = 0.012
 STILL = 1e-4

@@ -104,6 +104,8 @@ class Asked(msgspec.Struct, frozen=True, kw_only=True):
     """Its change since the slice before."""
     tool_m: Array
     """Where it brings the tool."""
+    tool_before_m: Array
+    """Where the slice before brought it."""
 
 
 class Felt(msgspec.Struct, frozen=True, kw_only=True):
@@ -141,10 +143,13 @@ def breach_asked(limits: SafetyLimits, asked: Asked) -> Breach | None:
     i = _first(speed - np.multiply(limits.speed_rad_s, 1.0 + 1e-9))
     if i is not None:
         return _breach(Cause.TARGET_SPEED, i, f"target moves at {speed[i]:.2f} rad/s, beyond its limit")
-    i = _beyond(asked.q_rad, limits, 0.0)
+    # Who stands beyond a limit may stand there and come back.
+    outwards = np.where(asked.q_rad * asked.qd_rad_s > 0.0, asked.q_rad, 0.0)
+    i = _beyond(outwards, limits, 0.0)
     if i is not None:
         return _breach(Cause.JOINT_LIMIT, i, f"target {asked.q_rad[i]:.3f} rad is beyond the joint's limit")
-    if _is_outside(limits.planes, asked.tool_m, 0.0):
+    leaving = tuple(p for p in limits.planes if float(np.dot(p.normal, asked.tool_m - asked.tool_before_m)) < 0.0)
+    if _is_outside(leaving, asked.tool_m, 0.0):
         return Breach(cause=Cause.PLANE, text="target position is beyond a safety plane")
     return None
 

@@ -30,7 +30,8 @@ NOMINAL = dh_rows(ARM)
 TCP = (0.01, -0.02, 0.16, 0.1, -0.4, 0.7)
 # Deltas of the size that a factory calibration has; the parallel axes' large opposite offsets are left out.
 DELTAS = tuple(
-    DhRow(a_m=0.0003 * (i - 2), d_m=-0.0002 * i, alpha_rad=0.001 * (i - 3), theta_rad=0.0015 * (2 - i)) for i in range(6)
+    DhRow(a_m=0.0003 * (i - 2), d_m=-0.0002 * i, alpha_rad=0.001 * (i - 3), theta_rad=0.0015 * (2 - i))
+    for i in range(6)
 )
 KINEMATICS = ArmKinematics(NOMINAL)
 CALIBRATED = ArmKinematics(NOMINAL, true=calibrated(NOMINAL, DELTAS))

@@ -28,8 +28,11 @@ def at(i, value):
     return out
 
 
+TOOL = np.array([0.3, 0, 0.3])
+
+
 def asked(**changes):
-    return Asked(**{"q_rad": np.zeros(6), "qd_rad_s": np.zeros(6), "tool_m": np.array([0, 0, 0.3])} | changes)
+    return Asked(**{"q_rad": np.zeros(6), "qd_rad_s": np.zeros(6), "tool_m": TOOL, "tool_before_m": TOOL} | changes)
 
 
 def felt(**changes):
@@ -60,9 +63,10 @@ def test_standing_still_is_always_allowed():
     ],
 )
 def test_what_is_asked_may_be_at_the_limit_and_not_beyond(joint, sign, field, limit, cause):
-    passes = breach_asked(LIMITS, asked(**{field: at(joint, sign * limit)}))
+    going = {"qd_rad_s": at(joint, sign * 0.1)}
+    passes = breach_asked(LIMITS, asked(**going | {field: at(joint, sign * limit)}))
     assert passes is None or passes.cause is not cause
-    breach = breach_asked(LIMITS, asked(**{field: at(joint, sign * after(limit))}))
+    breach = breach_asked(LIMITS, asked(**going | {field: at(joint, sign * after(limit))}))
     assert breach is not None
     assert (breach.cause, breach.joint, breach.cause.is_violation) == (cause, joint, False)
 
@@ -78,7 +82,8 @@ def test_what_is_asked_may_be_at_the_limit_and_not_beyond(joint, sign, field, li
     ],
 )
 def test_what_is_felt_may_be_just_below_the_limit_and_not_just_above(joint, field, limits, cause, is_violation):
-    assert breach_felt(LIMITS, felt(**{field: at(joint, limits[joint] - 1e-9)})) is None
+    below = breach_felt(LIMITS, felt(**{field: at(joint, limits[joint] - 1e-9)}))
+    assert below is None or below.cause is not cause
     breach = breach_felt(LIMITS, felt(**{field: at(joint, -limits[joint] - 1e-9)}))
     assert breach is not None
     assert (breach.cause, breach.joint, breach.cause.is_violation) == (cause, joint, is_violation)
@@ -105,6 +110,8 @@ def test_a_plane_stops_what_is_asked_and_four_centimetres_on_what_is_felt():
 
     assert breach_asked(LIMITS, asked(tool_m=z(0.1))) is None
     assert breach_asked(LIMITS, asked(tool_m=z(0.1 - 1e-9))).cause is Cause.PLANE
+    assert breach_asked(LIMITS, asked(tool_m=z(0.09), tool_before_m=z(0.09))) is None, "standing beyond it"
+    assert breach_asked(LIMITS, asked(tool_m=z(0.09), tool_before_m=z(0.08))) is None, "coming back"
     assert breach_felt(LIMITS, felt(tool_m=z(0.0600001))) is None
     assert breach_felt(LIMITS, felt(tool_m=z(0.0599999))).cause is Cause.PLANE_VIOLATION
 
@@ -118,7 +125,7 @@ def test_what_is_not_a_number_is_refused(value):
 @given(st.lists(st.floats(-10, 10), min_size=6, max_size=6), st.lists(st.floats(-10, 10), min_size=6, max_size=6))
 def test_whatever_passes_is_inside(q, qd):
     if breach_asked(LIMITS, asked(q_rad=np.array(q), qd_rad_s=np.array(qd))) is None:
-        assert np.abs(q).max() <= TWO_PI
+        assert all(abs(a) <= TWO_PI for a, b in zip(q, qd, strict=True) if a * b > 0.0)
         assert np.abs(qd).max() <= PI * (1 + 1e-8)
 
 
