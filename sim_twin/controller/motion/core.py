@@ -123,6 +123,11 @@ class MotionCore:
         """
         return self.kinematics.inverse(vec6(pose, "pose"), self.setpoint.q_target, self.tcp_offset)
 
+    def target_tool(self) -> tuple[Array, Array]:
+        """Return the UR pose and the speed (v, w) of the tool that the set-point asks for.  () -> (6,), (6,)"""
+        T_bt, J = self.kinematics.forward_and_jacobian(self.setpoint.q_target, self.T_ft)
+        return pose_from_matrix(T_bt), J @ self.setpoint.qd_target
+
     # --------------------------------------------------------------------------------------------------- one slice
 
     def put(self, q_rad: Array) -> None:

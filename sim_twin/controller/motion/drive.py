@@ -7,6 +7,7 @@ import msgspec
 import mujoco
 import numpy as np
 
+from sim_twin.controller.motion.contact import ContactWatch
 from sim_twin.controller.motion.core import MotionCore
 from sim_twin.controller.motion.kinematics import ArmKinematics, KinematicsError, dh_rows
 from sim_twin.controller.motion.limits import (
@@ -23,6 +24,7 @@ from sim_twin.controller.motion.motions import Motions
 from sim_twin.controller.motion.poses import Array, pose_from_matrix
 from sim_twin.controller.motion.setpoint import SLICE_S
 from sim_twin.controller.motion.wrench import NM_PER_A, ContactWrench, payload_bias
+from sim_twin.controller.states import MotionOrder
 from sim_twin.plant import TwinWorld
 
 __all__ = ["Measured", "TwinDrive", "servo_lag_s"]
@@ -74,6 +76,7 @@ class TwinDrive:
     Attributes:
         motions: What programs move the arm with.
         measured: After the last slice.
+        contact: Whether the tool met something (tool_contact).
         limits: Held from the next slice on.
         is_braked: The joints are locked and the servos have no power.
         n_slices: Slices since the start.
@@ -104,6 +107,7 @@ class TwinDrive:
             world.arm, kinematics=self.kinematics, q_rad=data.qpos[:6].copy(), servo_lag_s=self._lag_s
         )
         self._expected = data.qpos[:6].copy()
+        self.contact = ContactWatch()
         self._history: deque[Array] = deque(maxlen=N_HISTORY)
         self.n_slices = 0
         self.lock()
@@ -189,6 +193,7 @@ class TwinDrive:
         self.n_slices += 1
         self.measured = self._read()
         self._history.append(self.measured.q_rad)
+        self.contact.push(self.measured.wrench[:3], self.measured.tcp_speed[:3])
         if breach is None and not self.is_braked:
             breach = breach_felt(self.limits, self._felt())
             if breach is not None:
@@ -201,6 +206,17 @@ class TwinDrive:
             self.lock()
         elif not self.is_braked:
             self.core.begin_stop()
+
+    def obey(self, order: MotionOrder) -> None:
+        """Do what the modes' reaction asks of the motion."""
+        pace = self.core.pace
+        pace.is_paused = order is MotionOrder.PAUSE or (pace.is_paused and order is MotionOrder.NONE)
+        if order is MotionOrder.CUT:
+            self.lock()
+        elif order is MotionOrder.STOP:
+            self.stop()
+        elif order is MotionOrder.ENGAGE:
+            self.engage()
 
     @property
     def is_standing(self) -> bool:
@@ -249,20 +265,17 @@ class TwinDrive:
     def _read(self) -> Measured:
         model, data = self.world.model, self.world.data
         q, qd = data.qpos[:6].copy(), data.qvel[:6].copy()
-        T_bf, J_f = self.kinematics.forward_and_jacobian(q)
-        T_bt = T_bf @ self.core.T_ft
+        T_bt, J = self.kinematics.forward_and_jacobian(q, self.core.T_ft)
         tool_m = T_bt[:3, 3]
-        tcp_speed = J_f @ qd
-        tcp_speed[:3] += np.cross(tcp_speed[3:], tool_m - T_bf[:3, 3])
         wrench = self._contacts.at(model, data, tool_m) - self._zero
         if self._payload is not self._real_payload:
-            wrench += payload_bias(T_bf, tool_m, self._real_payload, self._payload)
+            wrench += payload_bias(self.kinematics.forward(q), tool_m, self._real_payload, self._payload)
         torque = data.qfrc_actuator[:6] + data.qfrc_gravcomp[:6]
         return Measured(
             q_rad=q,
             qd_rad_s=qd,
             tcp_pose=pose_from_matrix(T_bt),
-            tcp_speed=tcp_speed,
+            tcp_speed=J @ qd,
             wrench=wrench,
             torque_nm=torque,
             current_a=torque / NM_PER_A,

@@ -31,7 +31,7 @@ RANGE_RAD = TURN + 1e-9
 TOLERANCE = 1e-6
 """Newton stops after a step that moved no joint by more than this: its error is about the square."""
 MAX_NEWTON = 12
-MAX_STEP_RAD = 0.2
+MAX_STEP_RAD = 0.4
 """A Newton step longer than this has left the neighbourhood of its seed."""
 SINGULAR_DET = 1e-5
 """Smallest |det J| of a pose that can be left in every direction; the UR5e's greatest is about 0.07."""

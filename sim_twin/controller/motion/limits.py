@@ -121,10 +121,10 @@ class Felt(msgspec.Struct, frozen=True, kw_only=True):
 
 
 def default_limits(arm: ArmConfig) -> SafetyLimits:
-    """Return limits from the arm's file: one turn to either side, as UR's controller has it, and full speed."""
+    """Return limits from the arm's file: ranges (the twin's elbow has half of UR's), full speed, force."""
     return SafetyLimits(
-        q_min_rad=(-2.0 * np.pi,) * 6,
-        q_max_rad=(2.0 * np.pi,) * 6,
+        q_min_rad=tuple(j.range_rad[0] for j in arm.joints),
+        q_max_rad=tuple(j.range_rad[1] for j in arm.joints),
         speed_rad_s=tuple(j.speed_rad_s for j in arm.joints),
         tool_force_n=arm.motion.force_limit_n,
         deviation_rad=arm.motion.tracking_error_rad,

@@ -4,6 +4,7 @@ import pytest
 
 from config.loader import resolve
 from robot.servo import lag_s
+from sim_twin.controller.modes import Event, Modes, PowerTimes, RobotMode, RuntimeState
 from sim_twin.controller.motion.contact import ContactWatch
 from sim_twin.controller.motion.drive import TwinDrive
 from sim_twin.controller.motion.force import ForceTask
@@ -263,3 +264,80 @@ def test_weight_shows_in_the_currents():
     idle(drive, 5)
     assert abs(drive.measured.torque_nm[1]) > 10.0
     assert drive.measured.current_a[1] == pytest.approx(drive.measured.torque_nm[1] / 13.6)
+
+
+def step(drive, modes, motion):
+    """One slice of a controller: the program, the drive, the modes. Returns whether the program goes on."""
+    is_alive = motion is not None
+    if is_alive and modes.may_move:
+        is_alive = next(motion, "ended") != "ended"
+    breach = drive.tick()
+    if breach is not None:
+        event = Event.VIOLATION if breach.cause.is_violation else Event.PROTECTIVE_STOP
+        drive.obey(modes.handle(event, joint=breach.joint).motion)
+    drive.obey(modes.tick(is_standing=drive.is_standing).motion)
+    return is_alive
+
+
+def powered():
+    drive = make_drive(is_engaged=False)
+    modes = Modes(times=PowerTimes(n_power_on=5, n_brake_release=5, n_before_unlock=400))
+    modes.handle(Event.BRAKE_RELEASE)
+    for _ in range(12):
+        step(drive, modes, None)
+    assert modes.robot is RobotMode.RUNNING
+    assert not drive.is_braked
+    modes.handle(Event.PLAY)
+    return drive, modes
+
+
+@pytest.mark.parametrize(
+    ("happens", "is_over"),
+    [
+        (Event.PAUSE, (Event.PLAY,)),
+        (Event.SAFEGUARD_OPENED, (Event.SAFEGUARD_CLOSED,)),
+        (Event.PROTECTIVE_STOP, (Event.UNLOCK_PROTECTIVE_STOP, Event.PLAY)),
+    ],
+)
+def test_a_move_that_is_stopped_and_resumed_ends_where_it_should(happens, is_over):
+    drive, modes = powered()
+    goal = HOME + X * 0.8
+    motion = drive.motions.moves.movej(goal)
+    for _ in range(300):
+        step(drive, modes, motion)
+    drive.obey(modes.handle(happens).motion)
+    for _ in range(500):
+        step(drive, modes, motion)
+    assert modes.runtime is RuntimeState.PAUSED
+    assert drive.is_standing
+    for event in is_over:
+        reaction = modes.handle(event)
+        assert reaction.refusal is None
+        drive.obey(reaction.motion)
+    n = 0
+    while step(drive, modes, motion):
+        n += 1
+        assert n < 2000
+    idle(drive, 100)
+    assert modes.robot is RobotMode.RUNNING
+    assert drive.measured.q_rad == pytest.approx(goal, abs=1e-3)
+
+
+def test_an_emergency_stop_ends_in_brakes():
+    drive, modes = powered()
+    motion = drive.motions.moves.movej(HOME + X * 0.8)
+    for _ in range(400):
+        step(drive, modes, motion)
+    drive.obey(modes.handle(Event.ROBOT_ESTOP).motion)
+    for _ in range(300):
+        step(drive, modes, None)
+    assert (modes.robot, drive.is_braked, drive.is_standing) == (RobotMode.POWER_OFF, True, True)
+
+
+def test_the_set_points_tool_is_told():
+    drive = make_drive()
+    play(drive, drive.motions.speeds.speedl((0.0, 0.05, 0.0, 0.0, 0.0, 0.0), 0.5, 0.4))
+    pose, speed = drive.core.target_tool()
+    assert speed == pytest.approx([0, 0.05, 0, 0, 0, 0], abs=1e-4)
+    # The twin trails by its servo's lag.
+    assert pose[1] - drive.measured.tcp_pose[1] == pytest.approx(0.05 * 0.034, rel=0.1)

@@ -16,10 +16,14 @@ from sim_twin.controller.motion.limits import (
     default_limits,
 )
 
-LIMITS = msgspec.structs.replace(
-    default_limits(resolve().arm), planes=(Plane(normal=(0.0, 0.0, 1.0), offset_m=0.1),), tool_speed_m_s=1.5
-)
 TWO_PI, PI = 2 * np.pi, resolve().arm.joints[0].speed_rad_s
+LIMITS = msgspec.structs.replace(
+    default_limits(resolve().arm),
+    q_min_rad=(-TWO_PI,) * 6,
+    q_max_rad=(TWO_PI,) * 6,
+    planes=(Plane(normal=(0.0, 0.0, 1.0), offset_m=0.1),),
+    tool_speed_m_s=1.5,
+)
 
 
 def at(i, value):
