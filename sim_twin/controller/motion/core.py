@@ -15,7 +15,7 @@ from sim_twin.controller.motion.kinematics import ArmKinematics, joint_speeds_of
 from sim_twin.controller.motion.paths import Path
 from sim_twin.controller.motion.poses import Array, matrix_from_pose, pose_from_matrix, vec6
 from sim_twin.controller.motion.profiles import Residual, Trapezoid
-from sim_twin.controller.motion.servo import ServoFilter
+from sim_twin.controller.motion.servo import ServoFilter, limited
 from sim_twin.controller.motion.setpoint import SLICE_S, Pace, SetPoint
 
 __all__ = ["STOP_RAD_S2", "Motion", "MotionConflictError", "MotionCore", "Sensed", "Tail"]
@@ -79,14 +79,22 @@ class MotionCore:
     Args:
         kinematics: The arm's.
         setpoint: Where it is asked to be.
+        speed_rad_s: Greatest speed of each joint.
         servo_lag_s: How far the servo behind the set-point trails a ramp.
         dead_time_s: The dead time in the lag's law.
     """
 
     def __init__(
-        self, *, kinematics: ArmKinematics, setpoint: SetPoint, servo_lag_s: float, dead_time_s: float
+        self,
+        *,
+        kinematics: ArmKinematics,
+        setpoint: SetPoint,
+        speed_rad_s: Array,
+        servo_lag_s: float,
+        dead_time_s: float,
     ) -> None:
         self.kinematics, self.setpoint = kinematics, setpoint
+        self.speed_rad_s = speed_rad_s
         self.servo_lag_s, self.dead_time_s = servo_lag_s, dead_time_s
         self.pace = Pace()
         self.T_ft = np.eye(4)
@@ -197,11 +205,11 @@ class MotionCore:
     def _followed(self, sensed: Sensed, free: Array) -> Array:
         """Freedrive: the set-point runs ahead of the joints by what the servo would hold them back."""
         ahead = sensed.q_rad + FREEDRIVE_SHARE * self.servo_lag_s * sensed.qd_rad_s
-        if free.all():
-            return ahead
         q = self.setpoint.q_target
-        J = self.kinematics.jacobian(q, self.T_ft)
-        return q + joint_speeds_of(J, free * (J @ (ahead - q)))
+        if not free.all():
+            J = self.kinematics.jacobian(q, self.T_ft)
+            ahead = q + joint_speeds_of(J, free * (J @ (ahead - q)))
+        return limited(q, ahead, self.speed_rad_s * SLICE_S)
 
     # ------------------------------------------------------------------------------------------------- taking over
 

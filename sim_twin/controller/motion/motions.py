@@ -1,5 +1,7 @@
 """All motions of one arm behind one door."""
 
+import numpy as np
+
 from config.arm import ArmConfig
 from sim_twin.controller.motion.core import MotionCore
 from sim_twin.controller.motion.kinematics import ArmKinematics
@@ -34,6 +36,7 @@ class Motions:
         self.core = MotionCore(
             kinematics=kinematics,
             setpoint=self.setpoint,
+            speed_rad_s=np.array([j.speed_rad_s for j in arm.joints]),
             servo_lag_s=servo_lag_s,
             dead_time_s=arm.servo.dead_time_s,
         )

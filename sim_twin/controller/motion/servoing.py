@@ -42,7 +42,9 @@ class Servoing:
         )
         smoothing = core.tail.servo if core.tail else None
         if smoothing is None or smoothing.lag_s != lag_s:
-            smoothing = ServoFilter(core.setpoint.q_target, core.setpoint.qd_target, lag_s)
+            smoothing = ServoFilter(
+                core.setpoint.q_target, core.setpoint.qd_target, lag_s, speed_rad_s=core.speed_rad_s
+            )
         core.begin_free()
         self._target = target
         going_on = self._go_on(smoothing)
@@ -62,5 +64,7 @@ class Servoing:
             if n_stops != core.n_stops:
                 n_stops = core.n_stops
                 smoothing.seat(core.setpoint.q_target, core.setpoint.qd_target)
-            core.put(smoothing.step(self._target, SLICE_S * core.pace.scale))
+            # A jump is handed on as it is, for the limits to refuse.
+            is_far = smoothing.is_far(self._target)
+            core.put(self._target if is_far else smoothing.step(self._target, SLICE_S * core.pace.scale))
             yield

@@ -85,6 +85,19 @@ def test_servojs_lag_on_the_physics_is_the_law(lookahead, gain):
     assert np.mean(lags[-50:]) == pytest.approx(law, rel=0.1)
 
 
+@pytest.mark.parametrize("rate", [0.5, 1.5, 2.8])
+def test_targets_that_come_a_hundred_times_a_second_are_no_jumps(rate):
+    drive = make_drive()
+    target = HOME.copy()
+    for k in range(60):
+        target = target + X * min(rate, 0.1 * k) * 0.01
+        servo = drive.motions.servoing.servoj(target, t=0.01, lookahead_time=0.03, gain=1200)
+        assert play(drive, servo) is None
+    # The steps of 10 ms add 4 ms to a law that knows of steps of 2.
+    lag_of_it = (target - drive.measured.q_rad)[0] / rate + 0.002
+    assert lag_of_it == pytest.approx(0.031, abs=0.006), "seen at the end of the last target's 10 ms"
+
+
 # UR's figures for the CB3 UR5 at full speed, stretched out: distance and time of a category 0 stop.
 @pytest.mark.parametrize("is_cut", [False, True])
 @pytest.mark.parametrize(("joint", "distance_rad", "time_s"), [(0, 0.31, 0.244), (1, 0.70, 0.530), (2, 0.22, 0.164)])
