@@ -308,6 +308,9 @@ class MotionCore:
             left = now
             self.put(q)
             yield
+        # A slice at rest, so that nothing of the last step's speed is left to slow down.
+        self.put(q)
+        yield
 
     def _seat(self) -> None:
         self.nominal_rad = self.setpoint.q_target

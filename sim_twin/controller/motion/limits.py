@@ -144,8 +144,9 @@ def breach_asked(limits: SafetyLimits, asked: Asked) -> Breach | None:
     if i is not None:
         return _breach(Cause.TARGET_SPEED, i, f"target moves at {speed[i]:.2f} rad/s, beyond its limit")
     # Who stands beyond a limit may stand there and come back.
-    outwards = np.where(asked.q_rad * asked.qd_rad_s > 0.0, asked.q_rad, 0.0)
-    i = _beyond(outwards, limits, 0.0)
+    above = np.where(asked.qd_rad_s > 0.0, asked.q_rad - limits.q_max_rad, 0.0)
+    below = np.where(asked.qd_rad_s < 0.0, limits.q_min_rad - asked.q_rad, 0.0)
+    i = _first(np.maximum(above, below))
     if i is not None:
         return _breach(Cause.JOINT_LIMIT, i, f"target {asked.q_rad[i]:.3f} rad is beyond the joint's limit")
     leaving = tuple(p for p in limits.planes if float(np.dot(p.normal, asked.tool_m - asked.tool_before_m)) < 0.0)

@@ -354,3 +354,39 @@ def test_the_set_points_tool_is_told():
     assert speed == pytest.approx([0, 0.05, 0, 0, 0, 0], abs=1e-4)
     # The twin trails by its servo's lag.
     assert pose[1] - drive.measured.tcp_pose[1] == pytest.approx(0.05 * 0.034, rel=0.1)
+
+
+@pytest.mark.parametrize("joint", range(6))
+def test_a_joint_is_stopped_before_its_limit(joint):
+    drive = make_drive()
+    drive.limits = msgspec.structs.replace(drive.limits, q_max_rad=tuple(HOME + 0.1))
+    breach = play(drive, drive.motions.speeds.speedj(np.eye(6)[joint] * 0.3, 5.0, 3.0))
+    assert breach is not None
+    assert breach.code == f"C150A{joint}"
+    idle(drive, 200)
+    assert drive.is_standing
+    assert drive.measured.q_rad[joint] < HOME[joint] + 0.11
+    assert play(drive, drive.motions.moves.movej(HOME)) is None, "the way back is free"
+
+
+def test_a_joint_too_fast_is_a_stop():
+    drive = make_drive()
+    drive.limits = msgspec.structs.replace(drive.limits, speed_rad_s=(0.5,) * 6)
+    assert play(drive, drive.motions.speeds.speedj(X * 0.499, 2.0)) is None
+    breach = play(drive, drive.motions.speeds.speedj(X * 0.51, 2.0))
+    assert breach is not None
+    assert breach.cause is Cause.TARGET_SPEED
+
+
+def test_movel_is_straight_on_the_physics_too():
+    drive = make_drive()
+    start, goal = drive.measured.tcp_pose, drive.measured.tcp_pose.copy()
+    goal[:3] += (0.05, 0.15, 0.0)
+    way = (goal - start)[:3] / np.linalg.norm((goal - start)[:3])
+    seen = []
+    for _ in drive.motions.moves.movel(goal, 0.5, 0.2):
+        assert drive.tick() is None
+        seen.append(drive.measured.tcp_pose[:3] - start[:3])
+    off = np.linalg.norm(np.cross(seen, way), axis=1)
+    # The joints' equal lag bends no line; what is left is the arm's inertia.
+    assert off.max() < 2e-3
