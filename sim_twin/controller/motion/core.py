@@ -321,7 +321,7 @@ class MotionCore:
 
     def force_mode(self, task: ForceTask) -> None:
         """Comply from this slice on; a running force mode takes the new task."""
-        self._law = ForceLaw(task, dt_s=SLICE_S)
+        self._law = ForceLaw(task, dt_s=SLICE_S, before=self._law)
 
     def end_force_mode(self) -> None:
         """Hold where complying led to."""

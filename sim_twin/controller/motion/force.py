@@ -76,12 +76,13 @@ class ForceLaw:
     Args:
         task: What was asked.
         dt_s: One slice.
+        before: The law that this one takes over from: programs call force_mode again in every slice.
     """
 
-    def __init__(self, task: ForceTask, *, dt_s: float) -> None:
+    def __init__(self, task: ForceTask, *, dt_s: float, before: "ForceLaw | None" = None) -> None:
         self.task = task
         self._share = 1.0 - math.exp(-dt_s / SMOOTHING_S)
-        self._speed = np.zeros(6)
+        self._speed = np.zeros(6) if before is None else before._speed
         self._free = np.array(task.is_compliant, dtype=bool)
         self._gain = np.array(SPEED_PER_FORCE) * task.gain_scaling
         self._wrench, self._limits = np.array(task.wrench), np.abs(task.limits)

@@ -324,3 +324,15 @@ def test_the_task_frame_is_read_by_its_kind():
     assert task_axes(ForceTask(kind=ForceKind.MOTION, **task), tool, speed)[:, 0] == pytest.approx([0, 1, 0])
     for kind in ForceKind:
         assert np.linalg.det(task_axes(ForceTask(kind=kind, **task), tool, speed)) == pytest.approx(1.0)
+
+
+def test_force_mode_may_be_called_in_every_slice():
+    once, often = make_bench(), make_bench()
+    task = ForceTask(frame=(0,) * 6, is_compliant=(0, 0, 1, 0, 0, 0), wrench=(0, 0, -10, 0, 0, 0))
+    once.motions.core.force_mode(task)
+    for _ in range(50):
+        often.motions.core.force_mode(task)
+        once.end()
+        often.end()
+    assert (once.q[-1] == often.q[-1]).all()
+    assert once.path()[-1][2] < once.path()[0][2]
