@@ -36,6 +36,7 @@ class Moves:
             NoSolutionError: the pose is out of reach.
         """
         core = self._core
+        _check(a, v)
         end = core.joints_of(target) if is_pose else vec6(target)
         start, residual = core.begin(lambda speed: float(np.abs(speed).max()) / a)
         yield from self._run(JointPath(start, end), (v, a, t), residual, start, r)
@@ -49,6 +50,7 @@ class Moves:
             KinematicsError: the line leads out of reach or through a singular pose; nothing has moved.
         """
         core = self._core
+        _check(a, v)
         T_end = matrix_from_pose(vec6(target, "pose")) if is_pose else core.tool_at(vec6(target))
         start, residual = core.begin(lambda speed: self._tool_ramp_s(speed, a))
         yield from self._along(LinePath(core.tool_at(start), T_end), (v, a, t), residual, start, r)
@@ -78,6 +80,7 @@ class Moves:
             KinematicsError: the circle leads out of reach or through a singular pose; nothing has moved.
         """
         core = self._core
+        _check(a, v)
         via_m, T_end = vec6(via, "pose_via")[:3], matrix_from_pose(vec6(target, "pose_to"))
         start, residual = core.begin(lambda speed: self._tool_ramp_s(speed, a))
         path = ArcPath(core.tool_at(start), via_m, T_end, is_fixed=mode == 1)
@@ -110,9 +113,14 @@ class Moves:
         return max(float(np.linalg.norm(twist[:3])), TURN_M_PER_RAD * float(np.linalg.norm(twist[3:]))) / a
 
 
+def _check(a: float, v: float) -> None:
+    if not (a > 0.0 and v > 0.0):
+        raise ValueError(f"move: expected acceleration and speed above 0, got a {a} and v {v}; nothing has moved")
+
+
 def _profile(length: float, vat: tuple[float, float, float], residual: Residual | None) -> Trapezoid:
     """Return the speed along a path; while a residual runs out no more speed comes in than goes out."""
     v, a, t = vat
-    if residual is not None and a > 0.0 and v > 0.0:
+    if residual is not None:
         a = min(a, v / residual.duration_s)
     return Trapezoid(length, v=v, a=a, duration_s=t)

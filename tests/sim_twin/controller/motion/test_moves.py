@@ -336,3 +336,13 @@ def test_force_mode_may_be_called_in_every_slice():
         often.end()
     assert (once.q[-1] == often.q[-1]).all()
     assert once.path()[-1][2] < once.path()[0][2]
+
+
+@pytest.mark.parametrize(("a", "v"), [(0.0, 1.0), (1.0, 0.0), (-1.0, 1.0), (1.0, float("nan"))])
+def test_a_move_without_speed_is_refused_and_what_moved_before_goes_on(a, v):
+    bench = make_bench()
+    bench.run(bench.motions.speeds.speedj(X * 0.3, 2.0))
+    tail = bench.motions.core.tail
+    with pytest.raises(ValueError, match="above 0"):
+        bench.run(bench.motions.moves.movej(HOME, a, v))
+    assert bench.motions.core.tail is tail
