@@ -1,0 +1,356 @@
+"""What all motions share: the set-point, who drives it in a slice, what goes on when nobody does, and taking over.
+
+A motion is a Python generator; each `yield` is one slice of 2 ms, and in each slice it puts the set-point once. The
+caller resumes the program's motions and then ends the slice. A motion that returns while the arm still moves (a blend,
+a servo, a speed) leaves a tail that goes on until the next motion takes over, in the very slice that follows.
+"""
+
+from collections.abc import Callable, Generator, Sequence
+from typing import Protocol
+
+import numpy as np
+
+from sim_twin.controller.motion.force import ForceLaw, ForceTask
+from sim_twin.controller.motion.kinematics import ArmKinematics, joint_speeds_of
+from sim_twin.controller.motion.paths import Path
+from sim_twin.controller.motion.poses import Array, matrix_from_pose, pose_from_matrix, vec6
+from sim_twin.controller.motion.profiles import Residual, Trapezoid
+from sim_twin.controller.motion.servo import ServoFilter, limited
+from sim_twin.controller.motion.setpoint import SLICE_S, Pace, SetPoint
+
+__all__ = ["STOP_RAD_S2", "Motion", "MotionConflictError", "MotionCore", "Sensed", "Tail"]
+
+Motion = Generator[None, None, None]
+
+STOP_RAD_S2 = np.array([25.0, 8.4, 45.0, 45.0, 45.0, 45.0])
+"""With 35 ms of the servo's lag a stop from full speed takes what UR publishes for the CB3 UR5 (J0 0.31 rad in 244 ms,
+J1 0.70 in 530, J2 0.22 in 164; UR5e has graphs only). The wrists have no figures: they stop as the elbow does."""
+REST_RAD_S2 = 10.0
+"""Deceleration of a motion that its program abandoned."""
+BACK_RAD_S2 = 1.4
+"""Greatest acceleration of coming back onto a path after a stop."""
+STILL_RAD_S = 1e-6
+LEAST_PACE = 0.02
+"""Below this pace the speed of what is taken over counts as it is, not as what it would be at full pace."""
+FREEDRIVE_SHARE = 0.9
+"""How much of the servo's damping freedrive takes away; at 1 a push would never come to rest."""
+TIME_EPSILON_S = 1e-9
+
+
+class MotionConflictError(RuntimeError):
+    """Two threads of a program moved the arm in one slice."""
+
+
+class Sensed(Protocol):
+    """What motions need of a measurement."""
+
+    @property
+    def q_rad(self) -> Array:
+        """Joint angles."""
+        ...
+
+    @property
+    def qd_rad_s(self) -> Array:
+        """Joint speeds."""
+        ...
+
+    @property
+    def wrench(self) -> Array:
+        """Force and torque of the world on the tool, at the tool, base axes."""
+        ...
+
+
+class Tail:
+    """What goes on after a motion returned.
+
+    Args:
+        motion: Resumed once a slice while nobody drives.
+        anchor_rad: Where it would come to rest, if the next motion is to begin there (a blend).
+        servo: Its filter, if it is servoj's.
+    """
+
+    def __init__(self, motion: Motion, *, anchor_rad: Array | None = None, servo: ServoFilter | None = None) -> None:
+        self.motion, self.anchor_rad, self.servo = motion, anchor_rad, servo
+
+
+class MotionCore:
+    """The state that motions share.
+
+    Args:
+        kinematics: The arm's.
+        setpoint: Where it is asked to be.
+        speed_rad_s: Greatest speed of each joint.
+        servo_lag_s: How far the servo behind the set-point trails a ramp.
+        dead_time_s: The dead time in the lag's law.
+    """
+
+    def __init__(
+        self,
+        *,
+        kinematics: ArmKinematics,
+        setpoint: SetPoint,
+        speed_rad_s: Array,
+        servo_lag_s: float,
+        dead_time_s: float,
+    ) -> None:
+        self.kinematics, self.setpoint = kinematics, setpoint
+        self.speed_rad_s = speed_rad_s
+        self.servo_lag_s, self.dead_time_s = servo_lag_s, dead_time_s
+        self.pace = Pace()
+        self.T_ft = np.eye(4)
+        self.tail: Tail | None = None
+        self._stop_tail: Tail | None = None
+        self.nominal_rad = setpoint.q_target
+        self._nominal_before = setpoint.q_target
+        self._shift = np.zeros(6)
+        self._is_driven = self._was_driven = False
+        self._n_stops = 0
+        self._law: ForceLaw | None = None
+        self._free_axes: Array | None = None
+
+    # ------------------------------------------------------------------------------------------------ tool and poses
+
+    def set_tcp(self, offset: Sequence[float] | Array) -> None:
+        """Set the tool's pose in the flange frame, a UR pose; running moves keep theirs."""
+        self.T_ft = matrix_from_pose(vec6(offset, "tool offset"))
+
+    @property
+    def tcp_offset(self) -> Array:
+        """The tool's pose in the flange frame.  () -> (6,)"""
+        return pose_from_matrix(self.T_ft)
+
+    def tool_at(self, q_rad: Array) -> Array:
+        """Return T_bt for joint angles.  (6,) -> (4, 4)"""
+        return self.kinematics.forward(q_rad, self.T_ft)
+
+    def joints_of(self, pose: Sequence[float] | Array) -> Array:
+        """Return the joints of a UR pose nearest to the set-point.  (6,) -> (6,)
+
+        Raises:
+            NoSolutionError: it is out of reach.
+        """
+        return self.kinematics.inverse(vec6(pose, "pose"), self.setpoint.q_target, self.tcp_offset)
+
+    def target_tool(self) -> tuple[Array, Array]:
+        """Return the UR pose and the speed (v, w) of the tool that the set-point asks for.  () -> (6,), (6,)"""
+        T_bt, J = self.kinematics.forward_and_jacobian(self.setpoint.q_target, self.T_ft)
+        return pose_from_matrix(T_bt), J @ self.setpoint.qd_target
+
+    # --------------------------------------------------------------------------------------------------- one slice
+
+    def put(self, q_rad: Array) -> None:
+        """Drive the set-point in this slice.  (6,)
+
+        Raises:
+            MotionConflictError: somebody did already.
+        """
+        if self._is_driven:
+            raise MotionConflictError(
+                "expected one motion at a time, got a second in the same slice; kill the other thread"
+            )
+        self._is_driven = True
+        self._nominal_before, self.nominal_rad = self.nominal_rad, q_rad
+
+    def end_slice(self, sensed: Sensed) -> None:
+        """End the slice: go on with the tail or come to rest where nobody drove, and comply where force mode is on.
+
+        Raises:
+            SingularError: force mode or a tail leads through a singular pose.
+        """
+        self._was_driven = self._is_driven
+        if not self._is_driven:
+            self._idle(sensed)
+        self._is_driven = False
+        if self._law is not None:
+            self._shift = self._complied(self._law, sensed) - self.nominal_rad
+        self.setpoint.move(self.nominal_rad + self._shift)
+        self.pace.step()
+
+    @property
+    def nominal_speed_rad_s(self) -> Array:
+        """What the program's own motion did in the last slice, force mode aside.  () -> (6,)"""
+        return (self.nominal_rad - self._nominal_before) / SLICE_S
+
+    @property
+    def is_at_rest(self) -> bool:
+        """Nothing drives, nothing goes on and the set-point stands."""
+        is_idle = self.tail is None and not self._was_driven and not self._is_driven
+        return is_idle and self.setpoint.fastest_rad_s < STILL_RAD_S
+
+    def _idle(self, sensed: Sensed) -> None:
+        if self._free_axes is not None:
+            self.put(self._followed(sensed, self._free_axes))
+        elif self.tail is not None:
+            try:
+                next(self.tail.motion)
+            except StopIteration:
+                self.tail = None
+        if not self._is_driven:
+            self.put(self._resting())
+        self._was_driven = self.tail is not None
+
+    def _resting(self) -> Array:
+        speed = self.nominal_speed_rad_s
+        fastest = float(np.abs(speed).max())
+        if fastest <= REST_RAD_S2 * SLICE_S:
+            return self.nominal_rad
+        return self.nominal_rad + speed * (1.0 - REST_RAD_S2 * SLICE_S / fastest) * SLICE_S
+
+    def _complied(self, law: ForceLaw, sensed: Sensed) -> Array:
+        q = self.setpoint.q_target
+        T_bt, J = self.kinematics.forward_and_jacobian(q, self.T_ft)
+        twist = law.twist(J @ self.nominal_speed_rad_s, sensed.wrench, T_bt[:3, 3])
+        return q + joint_speeds_of(J, twist) * SLICE_S
+
+    def _followed(self, sensed: Sensed, free: Array) -> Array:
+        """Freedrive: the set-point runs ahead of the joints by what the servo would hold them back."""
+        ahead = sensed.q_rad + FREEDRIVE_SHARE * self.servo_lag_s * sensed.qd_rad_s
+        q = self.setpoint.q_target
+        if not free.all():
+            J = self.kinematics.jacobian(q, self.T_ft)
+            ahead = q + joint_speeds_of(J, free * (J @ (ahead - q)))
+        return limited(q, ahead, self.speed_rad_s * SLICE_S)
+
+    # ------------------------------------------------------------------------------------------------- taking over
+
+    def begin_free(self) -> Array:
+        """Take over for a motion without a path, and return the speed that it begins with.  () -> (6,)"""
+        self.tail = None
+        self._seat()
+        return self.setpoint.qd_target
+
+    def begin(self, ramp_s: Callable[[Array], float]) -> tuple[Array, Residual | None]:
+        """Take over for a path, and return where it begins and what is left of the motion before.
+
+        Args:
+            ramp_s: How long stopping takes from a joint speed, where the motion before does not say where it rests.
+        """
+        tail, self.tail = self.tail, None
+        pace = self.pace.scale if self.pace.scale > LEAST_PACE else 1.0
+        # What complies is not handed on: force mode goes on complying by itself.
+        complying = self._law is not None
+        speed = self.nominal_speed_rad_s if complying else self.setpoint.qd_target
+        speed = speed / pace
+        self._seat()
+        q = self.setpoint.q_target
+        if float(np.abs(speed).max()) < STILL_RAD_S:
+            return q, None
+        if tail is not None and tail.anchor_rad is not None:
+            offset = q - tail.anchor_rad
+            duration = -2.0 * float(offset @ speed) / float(speed @ speed)
+            if duration > SLICE_S:
+                return tail.anchor_rad, Residual(offset, speed, duration)
+        duration = max(ramp_s(speed), SLICE_S)
+        return q + speed * duration / 2.0, Residual(-speed * duration / 2.0, speed, duration)
+
+    def follow(self, path: Path, profile: Trapezoid, residual: Residual | None) -> Motion:
+        """Follow a path to its end while the residual of the motion before runs out.
+
+        Resumed after a stop that left the path, it comes back to where it was and goes on.
+        """
+        t, begun_s, n_stops = 0.0, 0.0, self._n_stops
+        while True:
+            t += SLICE_S * self.pace.scale
+            q = path.at(profile.at(t)[0])
+            if n_stops != self._n_stops:
+                n_stops, begun_s = self._n_stops, t
+                residual = _back(self.begin_free_at() - q)
+            left = residual.at(t - begun_s) if residual else None
+            self.put(q if left is None else q + left[0])
+            yield
+            if t >= profile.duration_s - TIME_EPSILON_S and left is None:
+                return
+
+    def begin_stop(self) -> None:
+        """Leave everything and stop as fast as the arm may: every joint in proportion, so that it stays on its line."""
+        speed = self.begin_free()
+        self._n_stops += 1
+        self._law, self._free_axes = None, None
+        self.tail = self._stop_tail = Tail(self._stopping(speed))
+
+    @property
+    def is_stopping(self) -> bool:
+        """A stop is on its way: it is never refused."""
+        return self.tail is not None and self.tail is self._stop_tail
+
+    @property
+    def n_stops(self) -> int:
+        """How often the arm was stopped off its path: what remembers a set-point from before has to look again."""
+        return self._n_stops
+
+    def begin_free_at(self) -> Array:
+        """Take over for a motion that remembers where it was, and return where the set-point is.  () -> (6,)"""
+        self.begin_free()
+        return self.setpoint.q_target
+
+    def refuse(self, sensed: Sensed, *, is_moved: bool = True) -> None:
+        """Take the slice's set-point back, where it was moved already, and stop from the one before."""
+        if is_moved:
+            self.setpoint.undo()
+        self._is_driven = False
+        self.begin_stop()
+        self.end_slice(sensed)
+
+    def hold(self, q_rad: Array) -> None:
+        """Put the set-point on the joints as they are, at rest; everything before is forgotten.  (6,)"""
+        self.tail, self._law, self._free_axes = None, None, None
+        self._n_stops += 1
+        self.setpoint.place(q_rad)
+        self._is_driven = self._was_driven = False
+        self._seat()
+
+    def _stopping(self, speed: Array) -> Motion:
+        stop_s = float((np.abs(speed) / STOP_RAD_S2).max())
+        left, q = stop_s, self.setpoint.q_target
+        while left > 0.0:
+            now = max(0.0, left - SLICE_S)
+            q = q + speed / stop_s * (left * left - now * now) / 2.0
+            left = now
+            self.put(q)
+            yield
+        # A slice at rest, so that nothing of the last step's speed is left to slow down.
+        self.put(q)
+        yield
+
+    def _seat(self) -> None:
+        self.nominal_rad = self.setpoint.q_target
+        self._nominal_before = self.nominal_rad - self.setpoint.qd_target * SLICE_S
+        self._shift = np.zeros(6)
+
+    # --------------------------------------------------------------------------------------- force mode, freedrive
+
+    def force_mode(self, task: ForceTask) -> None:
+        """Comply from this slice on; a running force mode takes the new task."""
+        self._law = ForceLaw(task, dt_s=SLICE_S, before=self._law)
+
+    def end_force_mode(self) -> None:
+        """Hold where complying led to."""
+        if self._law is None:
+            return
+        self._law = None
+        if not self._was_driven and not self._is_driven:
+            self._seat()
+
+    @property
+    def force_task(self) -> ForceTask | None:
+        """What force mode was told, None where it is off."""
+        return None if self._law is None else self._law.task
+
+    def freedrive(self, free_axes: Sequence[float] = (1, 1, 1, 1, 1, 1)) -> None:
+        """Let the joints be led by hand; axes that are not free (base axes at the tool) are held."""
+        self.tail = None
+        self._free_axes = np.array(free_axes, dtype=bool)
+
+    def end_freedrive(self) -> None:
+        """Hold where the arm was led to."""
+        self._free_axes = None
+
+    @property
+    def is_free(self) -> bool:
+        """Freedrive is on."""
+        return self._free_axes is not None
+
+
+def _back(offset: Array) -> Residual:
+    """Return the way back onto a path, from rest."""
+    return Residual(offset, np.zeros(6), max(0.2, float(np.sqrt(6.0 * np.abs(offset).max() / BACK_RAD_S2))))

@@ -1,0 +1,283 @@
+"""The drive: set-points into the twin's servos, 2 ms of physics, measurements out; brakes where there is no power."""
+
+from collections import deque
+from collections.abc import Sequence
+
+import msgspec
+import mujoco
+import numpy as np
+
+from sim_twin.controller.motion.contact import ContactWatch
+from sim_twin.controller.motion.core import MotionCore
+from sim_twin.controller.motion.kinematics import ArmKinematics, KinematicsError, dh_rows
+from sim_twin.controller.motion.limits import (
+    Asked,
+    Breach,
+    Cause,
+    Felt,
+    SafetyLimits,
+    breach_asked,
+    breach_felt,
+    default_limits,
+)
+from sim_twin.controller.motion.motions import Motions
+from sim_twin.controller.motion.poses import Array, pose_from_matrix
+from sim_twin.controller.motion.setpoint import SLICE_S
+from sim_twin.controller.motion.wrench import NM_PER_A, ContactWrench, payload_bias
+from sim_twin.controller.states import MotionOrder
+from sim_twin.plant import TwinWorld
+
+__all__ = ["Measured", "TwinDrive", "servo_lag_s"]
+
+BRAKE_NM = np.array([60.0, 35.0, 20.5, 6.0, 6.0, 6.0])
+"""Torque of brakes that stop a moving arm: with the twin's own tool its distances are those that UR publishes for the
+CB3 UR5's category 0 stop (see core.STOP_RAD_S2)."""
+HOLD_NM = np.array([150.0, 150.0, 150.0, 28.0, 28.0, 28.0])
+"""Torque of brakes that hold a standing one."""
+HELD_RAD_S = 0.005
+BRAKE_SOLIMP = (0.9999, 0.9999)
+"""A brake that hardly creeps; MuJoCo's own friction gives way in proportion to the load."""
+N_HISTORY = 1000
+
+
+class Measured(msgspec.Struct, frozen=True, kw_only=True):
+    """What the arm measured after a slice. Arrays of their own; base axes, SI units."""
+
+    q_rad: Array
+    qd_rad_s: Array
+    tcp_pose: Array
+    """UR pose of the tool that the program set."""
+    tcp_speed: Array
+    """(v, w) of it."""
+    wrench: Array
+    """Force and torque of the world on the tool, at the tool; payload as told taken off, zeroed."""
+    torque_nm: Array
+    """Of the joints, weight included."""
+    current_a: Array
+    """Torque over a constant of each joint."""
+    external_nm: Array
+    """Torque on the joints from contacts."""
+
+
+def servo_lag_s(model: mujoco.MjModel, actuator: int, *, tick_s: float) -> float:
+    """Return how far a joint of the twin trails a ramp of set-points: damping over stiffness, delay, half a tick."""
+    stiffness, damping = -float(model.actuator_biasprm[actuator, 1]), -float(model.actuator_biasprm[actuator, 2])
+    return damping / stiffness + float(model.actuator_delay[actuator]) + tick_s / 2.0
+
+
+class TwinDrive:
+    """Owns a twin's world and moves its arm. Starts with brakes on and no power.
+
+    Args:
+        world: The twin, with a tick of one slice.
+        kinematics: The controller's idea of the arm; the arm file's where absent.
+        limits: Safety limits; the arm file's where absent.
+
+    Attributes:
+        motions: What programs move the arm with.
+        measured: After the last slice.
+        contact: Whether the tool met something (tool_contact).
+        limits: Held from the next slice on.
+        is_braked: The joints are locked and the servos have no power.
+        n_slices: Slices since the start.
+
+    Raises:
+        ValueError: the world's tick is not one slice.
+    """
+
+    def __init__(
+        self, world: TwinWorld, *, kinematics: ArmKinematics | None = None, limits: SafetyLimits | None = None
+    ) -> None:
+        if abs(world.tick_s - SLICE_S) > 1e-12:
+            raise ValueError(f"twin's rig: expected tick_s {SLICE_S}, got {world.tick_s}; set it so in the rig")
+        self.world = world
+        self.kinematics = kinematics or ArmKinematics(dh_rows(world.arm))
+        self.limits = limits or default_limits(world.arm)
+        model, data = world.model, world.data
+        self._controls = world.joint_controls
+        self._gains = model.actuator_gainprm[self._controls].copy()
+        self._biases = model.actuator_biasprm[self._controls].copy()
+        self._lag_s = servo_lag_s(model, int(self._controls[0]), tick_s=world.tick_s)
+        self._contacts = ContactWrench(model)
+        tool = world.arm.tool
+        self._real_payload = (tool.mass_kg, np.array(tool.com_m))
+        self._payload = self._real_payload
+        self._zero = np.zeros(6)
+        self.motions = Motions(
+            world.arm, kinematics=self.kinematics, q_rad=data.qpos[:6].copy(), servo_lag_s=self._lag_s
+        )
+        self._expected = data.qpos[:6].copy()
+        self.contact = ContactWatch()
+        self._history: deque[Array] = deque(maxlen=N_HISTORY)
+        self.n_slices = 0
+        self.lock()
+        self.measured = self._read()
+
+    @property
+    def core(self) -> MotionCore:
+        """What motions share."""
+        return self.motions.core
+
+    # ------------------------------------------------------------------------------------------------------- power
+
+    def lock(self) -> None:
+        """Cut the servos' power and let the brakes in: a moving arm is stopped by its brakes (category 0)."""
+        model = self.world.model
+        model.actuator_gainprm[self._controls] = 0.0
+        model.actuator_biasprm[self._controls] = 0.0
+        model.dof_frictionloss[:6] = BRAKE_NM
+        model.dof_solimp[:6, :2] = BRAKE_SOLIMP
+        self.is_braked = True
+        self._seat()
+
+    def engage(self) -> None:
+        """Give the servos power where the joints are and release the brakes."""
+        model = self.world.model
+        model.actuator_gainprm[self._controls] = self._gains
+        model.actuator_biasprm[self._controls] = self._biases
+        model.dof_frictionloss[:6] = 0.0
+        self.is_braked = False
+        self._seat()
+
+    def _seat(self) -> None:
+        q = self.world.data.qpos[:6].copy()
+        self.world.data.ctrl[self._controls] = q
+        self._expected = q
+        self.core.hold(q)
+
+    # ------------------------------------------------------------------------------------------------------ sensing
+
+    def set_payload(self, mass_kg: float, cog_m: Sequence[float] = (0.0, 0.0, 0.0)) -> None:
+        """Tell the controller what hangs on the flange; what is not so biases the force.
+
+        Raises:
+            ValueError: a mass below zero.
+        """
+        if not mass_kg >= 0.0:
+            raise ValueError(f"payload: expected 0 kg or more, got {mass_kg}; give the mass that hangs on the flange")
+        self._payload = (mass_kg, np.array(cog_m, dtype=np.float64))
+
+    @property
+    def payload(self) -> tuple[float, Array]:
+        """Mass (kg) and centre of gravity (m, flange frame) as told."""
+        return self._payload
+
+    def zero_force(self) -> None:
+        """Take what the force sensor reads now as nothing (zero_ftsensor)."""
+        self._zero = self._zero + self.measured.wrench
+
+    def joint_history(self, n_slices: int) -> Array:
+        """Return the joints measured some slices ago; the oldest kept where that is too long ago.  () -> (6,)"""
+        if not self._history:
+            return self.measured.q_rad
+        return self._history[max(-len(self._history), -1 - max(0, n_slices))]
+
+    # -------------------------------------------------------------------------------------------------- one slice
+
+    def tick(self) -> Breach | None:
+        """End the slice, let 2 ms pass and measure; return the first limit that was passed.
+
+        Whatever passes a limit is not asked of the servos: the arm stops by itself (category 2) on a protective stop
+        and is cut and braked (category 0) on a violation. The caller tells the modes and the program.
+        """
+        breach = None if self.is_braked else self._drive()
+        data = self.world.data
+        if self.is_braked:
+            data.ctrl[self._controls] = data.qpos[:6]
+            if float(np.abs(data.qvel[:6]).max()) < HELD_RAD_S:
+                self.world.model.dof_frictionloss[:6] = HOLD_NM
+            self.core.hold(data.qpos[:6].copy())
+        else:
+            data.ctrl[self._controls] = self.motions.setpoint.q_target
+        self.world.clock.wait_tick()
+        self.n_slices += 1
+        self.measured = self._read()
+        self._history.append(self.measured.q_rad)
+        self.contact.push(self.measured.wrench[:3], self.measured.tcp_speed[:3])
+        if breach is None and not self.is_braked:
+            breach = breach_felt(self.limits, self._felt())
+            if breach is not None:
+                self.stop(is_cut=breach.cause.is_violation)
+        return breach
+
+    def stop(self, *, is_cut: bool = False) -> None:
+        """Stop as fast as the arm may and hold, or cut the drives and brake."""
+        if is_cut:
+            self.lock()
+        elif not self.is_braked:
+            self.core.begin_stop()
+
+    def obey(self, order: MotionOrder) -> None:
+        """Do what the modes' reaction asks of the motion."""
+        pace = self.core.pace
+        pace.is_paused = order is MotionOrder.PAUSE or (pace.is_paused and order is MotionOrder.NONE)
+        if order is MotionOrder.CUT:
+            self.lock()
+        elif order is MotionOrder.STOP:
+            self.stop()
+        elif order is MotionOrder.ENGAGE:
+            self.engage()
+
+    @property
+    def is_standing(self) -> bool:
+        """Set-point and joints are at rest."""
+        return self.motions.setpoint.fastest_rad_s < 1e-6 and float(np.abs(self.measured.qd_rad_s).max()) < 0.01
+
+    def _drive(self) -> Breach | None:
+        core, setpoint = self.core, self.motions.setpoint
+        before_m = self._asked_tool_m()
+        try:
+            core.end_slice(self.measured)
+        except KinematicsError as error:
+            core.refuse(self.measured, is_moved=False)
+            return Breach(cause=Cause.SINGULARITY, text=str(error))
+        breach = None
+        if not core.is_stopping:
+            asked = Asked(
+                q_rad=setpoint.q_target,
+                qd_rad_s=setpoint.qd_target,
+                tool_m=self._asked_tool_m(),
+                tool_before_m=before_m,
+            )
+            breach = breach_asked(self.limits, asked)
+        if breach is not None:
+            core.refuse(self.measured)
+        # A first-order lag of the set-points: where the servo should have brought the joints by now.
+        self._expected = self._expected + SLICE_S / (SLICE_S + self._lag_s) * (setpoint.q_target - self._expected)
+        return breach
+
+    def _asked_tool_m(self) -> Array:
+        """Where the set-point brings the tool; of no interest where there is no plane."""
+        return self.core.tool_at(self.motions.setpoint.q_target)[:3, 3] if self.limits.planes else np.zeros(3)
+
+    def _felt(self) -> Felt:
+        now = self.measured
+        return Felt(
+            q_rad=now.q_rad,
+            qd_rad_s=now.qd_rad_s,
+            q_expected_rad=self._expected,
+            tool_m=now.tcp_pose[:3],
+            tool_speed_m_s=float(np.linalg.norm(now.tcp_speed[:3])),
+            force_n=float(np.linalg.norm(now.wrench[:3])),
+            external_nm=now.external_nm,
+        )
+
+    def _read(self) -> Measured:
+        model, data = self.world.model, self.world.data
+        q, qd = data.qpos[:6].copy(), data.qvel[:6].copy()
+        T_bt, J = self.kinematics.forward_and_jacobian(q, self.core.T_ft)
+        tool_m = T_bt[:3, 3]
+        wrench = self._contacts.at(model, data, tool_m) - self._zero
+        if self._payload is not self._real_payload:
+            wrench += payload_bias(self.kinematics.forward(q), tool_m, self._real_payload, self._payload)
+        torque = data.qfrc_actuator[:6] + data.qfrc_gravcomp[:6]
+        return Measured(
+            q_rad=q,
+            qd_rad_s=qd,
+            tcp_pose=pose_from_matrix(T_bt),
+            tcp_speed=J @ qd,
+            wrench=wrench,
+            torque_nm=torque,
+            current_a=torque / NM_PER_A,
+            external_nm=data.qfrc_constraint[:6].copy(),
+        )

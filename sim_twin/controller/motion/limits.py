@@ -1,0 +1,211 @@
+"""What a slice may ask and what may be measured: which stop the first breach brings. Pure.
+
+Two tiers, as on a robot: what is *asked* beyond a limit brings a protective stop, and what is *measured* beyond a
+limit and its tolerance (the trueness of the e-Series' safety functions) is a violation and cuts the drives.
+"""
+
+from collections.abc import Sequence
+from enum import Enum
+
+import msgspec
+import numpy as np
+
+from config.arm import ArmConfig
+from sim_twin.controller.motion.poses import Array
+from sim_twin.controller.motion.setpoint import SLICE_S
+
+__all__ = ["Asked", "Breach", "Cause", "Felt", "Plane", "SafetyLimits", "breach_asked", "breach_felt", "default_limits"]
+
+JUMP_SPEEDS = 2.0
+"""A change of more than this many slices at full speed is a jump, not a speed."""
+# Trueness of the e-Series' safety functions, from the manual.
+JOINT_TOLERANCE_RAD = float(np.radians(5.0))
+JOINT_SPEED_TOLERANCE_RAD_S = float(np.radians(1.15))
+PLANE_TOLERANCE_M = 0.040
+SPEED_TOLERANCE_M_S = 0.050
+FORCE_TOLERANCE_N = 25.0
+
+
+class Cause(Enum):
+    """Why the robot stops: UR's code number (0 where none is known), its argument, whether it cuts the drives.
+
+    C153, C157 and C163 are UR's own (service note), C204A1 is quoted on its forum; C150, C152, C154, C158 and C204A2
+    are recalled from its list of error codes.
+    """
+
+    NOT_FINITE = (204, 0, False)
+    JUMP = (204, 1, False)
+    TARGET_SPEED = (204, 2, False)
+    JOINT_LIMIT = (150, 0, False)
+    PLANE = (152, 0, False)
+    DEVIATION = (153, 0, False)
+    SINGULARITY = (154, 0, False)
+    JOINT_COLLISION = (157, 0, False)
+    TOOL_COLLISION = (158, 0, False)
+    TOO_MANY_STOPS = (163, 0, True)
+    JOINT_VIOLATION = (0, 1, True)
+    JOINT_SPEED_VIOLATION = (0, 2, True)
+    TOOL_SPEED_VIOLATION = (0, 3, True)
+    PLANE_VIOLATION = (0, 4, True)
+    FORCE_VIOLATION = (0, 5, True)
+
+    @property
+    def code(self) -> int:
+        """UR's number, 0 where none is known."""
+        return self.value[0]
+
+    @property
+    def is_violation(self) -> bool:
+        """It cuts the drives; otherwise it is a protective stop."""
+        return self.value[2]
+
+
+class Breach(msgspec.Struct, frozen=True, kw_only=True):
+    """One limit that was passed."""
+
+    cause: Cause
+    text: str
+    joint: int | None = None
+    """0 to 5 where one joint is to blame."""
+
+    @property
+    def code(self) -> str:
+        """The number as UR writes it, such as C153A2; empty where none is known."""
+        argument = self.cause.value[1] if self.joint is None else self.joint
+        return f"C{self.cause.code}A{argument}" if self.cause.code else ""
+
+
+class Plane(msgspec.Struct, frozen=True, kw_only=True):
+    """The tool stays where normal · p is at least offset; base frame, normal of length 1."""
+
+    normal: tuple[float, float, float]
+    offset_m: float
+
+
+class SafetyLimits(msgspec.Struct, frozen=True, kw_only=True):
+    """One set of limits; a robot has one for normal and one for reduced mode."""
+
+    q_min_rad: tuple[float, ...]
+    q_max_rad: tuple[float, ...]
+    speed_rad_s: tuple[float, ...]
+    tool_speed_m_s: float = 3.0
+    tool_force_n: float = 250.0
+    deviation_rad: float = 0.25
+    collision_nm: tuple[float, ...] = (110.0, 110.0, 110.0, 22.0, 22.0, 22.0)
+    """Torque from outside on a joint that counts as a collision."""
+    planes: tuple[Plane, ...] = ()
+
+
+class Asked(msgspec.Struct, frozen=True, kw_only=True):
+    """One slice's set-point."""
+
+    q_rad: Array
+    qd_rad_s: Array
+    """Its change since the slice before."""
+    tool_m: Array
+    """Where it brings the tool."""
+    tool_before_m: Array
+    """Where the slice before brought it."""
+
+
+class Felt(msgspec.Struct, frozen=True, kw_only=True):
+    """One slice's measurement, beside the set-point that it should have reached by now."""
+
+    q_rad: Array
+    qd_rad_s: Array
+    q_expected_rad: Array
+    tool_m: Array
+    tool_speed_m_s: float
+    force_n: float
+    external_nm: Array
+
+
+def default_limits(arm: ArmConfig) -> SafetyLimits:
+    """Return limits from the arm's file: ranges (the twin's elbow has half of UR's), full speed, force."""
+    return SafetyLimits(
+        q_min_rad=tuple(j.range_rad[0] for j in arm.joints),
+        q_max_rad=tuple(j.range_rad[1] for j in arm.joints),
+        speed_rad_s=tuple(j.speed_rad_s for j in arm.joints),
+        tool_force_n=arm.motion.force_limit_n,
+        deviation_rad=arm.motion.tracking_error_rad,
+    )
+
+
+def breach_asked(limits: SafetyLimits, asked: Asked) -> Breach | None:
+    """Return the first limit that a set-point passes, or None."""
+    if not np.isfinite(asked.q_rad).all():
+        return Breach(cause=Cause.NOT_FINITE, text="target position is not a number; check what the program computes")
+    speed = np.abs(asked.qd_rad_s)
+    i = _first(speed - np.multiply(limits.speed_rad_s, JUMP_SPEEDS))
+    if i is not None:
+        jump = speed[i] * SLICE_S
+        return _breach(Cause.JUMP, i, f"target jumped by {jump:.3f} rad in one slice; send nearer targets")
+    i = _first(speed - np.multiply(limits.speed_rad_s, 1.0 + 1e-9))
+    if i is not None:
+        return _breach(Cause.TARGET_SPEED, i, f"target moves at {speed[i]:.2f} rad/s, beyond its limit")
+    # Who stands beyond a limit may stand there and come back.
+    above = np.where(asked.qd_rad_s > 0.0, asked.q_rad - limits.q_max_rad, 0.0)
+    below = np.where(asked.qd_rad_s < 0.0, limits.q_min_rad - asked.q_rad, 0.0)
+    i = _first(np.maximum(above, below))
+    if i is not None:
+        return _breach(Cause.JOINT_LIMIT, i, f"target {asked.q_rad[i]:.3f} rad is beyond the joint's limit")
+    leaving = tuple(p for p in limits.planes if float(np.dot(p.normal, asked.tool_m - asked.tool_before_m)) < 0.0)
+    if _is_outside(leaving, asked.tool_m, 0.0):
+        return Breach(cause=Cause.PLANE, text="target position is beyond a safety plane")
+    return None
+
+
+def breach_felt(limits: SafetyLimits, felt: Felt) -> Breach | None:
+    """Return the first limit that a measurement passes, or None; violations come before protective stops."""
+    return _violation(limits, felt) or _collision(limits, felt)
+
+
+def _violation(limits: SafetyLimits, felt: Felt) -> Breach | None:
+    i = _beyond(felt.q_rad, limits, JOINT_TOLERANCE_RAD)
+    if i is not None:
+        return _breach(Cause.JOINT_VIOLATION, i, f"joint at {felt.q_rad[i]:.3f} rad is beyond its limit")
+    speed = np.abs(felt.qd_rad_s)
+    i = _first(speed - limits.speed_rad_s - JOINT_SPEED_TOLERANCE_RAD_S)
+    if i is not None:
+        return _breach(Cause.JOINT_SPEED_VIOLATION, i, f"joint turns at {speed[i]:.2f} rad/s, beyond its limit")
+    if felt.tool_speed_m_s > limits.tool_speed_m_s + SPEED_TOLERANCE_M_S:
+        text = f"tool moves at {felt.tool_speed_m_s:.2f} m/s, limit {limits.tool_speed_m_s:.2f}"
+        return Breach(cause=Cause.TOOL_SPEED_VIOLATION, text=text)
+    if _is_outside(limits.planes, felt.tool_m, PLANE_TOLERANCE_M):
+        return Breach(cause=Cause.PLANE_VIOLATION, text="tool is beyond a safety plane")
+    if felt.force_n > limits.tool_force_n + FORCE_TOLERANCE_N:
+        text = f"force on the tool is {felt.force_n:.0f} N, limit {limits.tool_force_n:.0f}"
+        return Breach(cause=Cause.FORCE_VIOLATION, text=text)
+    return None
+
+
+def _collision(limits: SafetyLimits, felt: Felt) -> Breach | None:
+    outside = np.abs(felt.external_nm)
+    i = _first(outside - limits.collision_nm)
+    if i is not None:
+        return _breach(Cause.JOINT_COLLISION, i, f"collision detected by joint: {outside[i]:.0f} Nm from outside")
+    if felt.force_n > limits.tool_force_n:
+        return Breach(cause=Cause.TOOL_COLLISION, text=f"collision detected at the tool: {felt.force_n:.0f} N")
+    off = np.abs(felt.q_expected_rad - felt.q_rad)
+    i = _first(off - limits.deviation_rad)
+    if i is not None:
+        return _breach(Cause.DEVIATION, i, f"position deviates from path by {off[i]:.3f} rad")
+    return None
+
+
+def _breach(cause: Cause, joint: int, text: str) -> Breach:
+    return Breach(cause=cause, text=f"joint {joint}: {text}", joint=joint)
+
+
+def _first(excess: Array) -> int | None:
+    """Return the first joint with more than nothing too much; what is not a number is too much."""
+    over = ~(excess <= 0.0)
+    return int(over.argmax()) if over.any() else None
+
+
+def _beyond(q: Array, limits: SafetyLimits, tolerance: float) -> int | None:
+    return _first(np.maximum(q - limits.q_max_rad, limits.q_min_rad - q) - tolerance)
+
+
+def _is_outside(planes: Sequence[Plane], tool_m: Array, tolerance: float) -> bool:
+    return any(not float(np.dot(p.normal, tool_m)) >= p.offset_m - tolerance for p in planes)

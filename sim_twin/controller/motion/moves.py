@@ -1,0 +1,126 @@
+"""movej, movel, movep, movec and servoc: paths with trapezoidal speed and blends."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from sim_twin.controller.motion.core import Motion, MotionCore, Tail
+from sim_twin.controller.motion.paths import TURN_M_PER_RAD, ArcPath, JointPath, LinePath, Path, ToolPath, TrackedPath
+from sim_twin.controller.motion.poses import Array, matrix_from_pose, vec6
+from sim_twin.controller.motion.profiles import Residual, Trapezoid
+
+__all__ = ["Moves"]
+
+Numbers = Sequence[float] | Array
+
+
+class Moves:
+    """Generators that follow a path; resume one once a slice.
+
+    A move with a blend radius returns as soon as the tool is within it; what is left goes on as a tail, and the next
+    move, begun in that same slice, blends. Half of the move's own length is the most that a radius counts for.
+
+    Args:
+        core: What motions share.
+    """
+
+    def __init__(self, core: MotionCore) -> None:
+        self._core = core
+
+    def movej(
+        self, target: Numbers, a: float = 1.4, v: float = 1.05, t: float = 0.0, r: float = 0.0, *, is_pose: bool = False
+    ) -> Motion:
+        """Move all joints in proportion to joint angles, or to a UR pose where is_pose says so.
+
+        Raises:
+            NoSolutionError: the pose is out of reach.
+        """
+        core = self._core
+        _check(a, v)
+        end = core.joints_of(target) if is_pose else vec6(target)
+        start, residual = core.begin(lambda speed: float(np.abs(speed).max()) / a)
+        yield from self._run(JointPath(start, end), (v, a, t), residual, start, r)
+
+    def movel(
+        self, target: Numbers, a: float = 1.2, v: float = 0.25, t: float = 0.0, r: float = 0.0, *, is_pose: bool = True
+    ) -> Motion:
+        """Move the tool straight to a UR pose, or to where joint angles bring it.
+
+        Raises:
+            KinematicsError: the line leads out of reach or through a singular pose; nothing has moved.
+        """
+        core = self._core
+        _check(a, v)
+        T_end = matrix_from_pose(vec6(target, "pose")) if is_pose else core.tool_at(vec6(target))
+        start, residual = core.begin(lambda speed: self._tool_ramp_s(speed, a))
+        yield from self._along(LinePath(core.tool_at(start), T_end), (v, a, t), residual, start, r)
+
+    def movep(
+        self, target: Numbers, a: float = 1.2, v: float = 0.25, r: float = 0.0, *, is_pose: bool = True
+    ) -> Motion:
+        """Move the tool straight and blend: as movel, without a time.
+
+        UR blends movep on circles at constant tool speed; here its blends are movel's parabolas.
+        """
+        return self.movel(target, a, v, 0.0, r, is_pose=is_pose)
+
+    def servoc(
+        self, target: Numbers, a: float = 1.2, v: float = 0.25, r: float = 0.0, *, is_pose: bool = True
+    ) -> Motion:
+        """Servo the tool towards a pose; the next servoc takes over within r: as movep."""
+        return self.movel(target, a, v, 0.0, r, is_pose=is_pose)
+
+    def movec(
+        self, via: Numbers, target: Numbers, a: float = 1.2, v: float = 0.25, r: float = 0.0, mode: int = 0
+    ) -> Motion:
+        """Move the tool on the circle through a pose to another; mode 1 keeps its turn against the tangent.
+
+        Raises:
+            PathError: the three points lie on one line.
+            KinematicsError: the circle leads out of reach or through a singular pose; nothing has moved.
+        """
+        core = self._core
+        _check(a, v)
+        via_m, T_end = vec6(via, "pose_via")[:3], matrix_from_pose(vec6(target, "pose_to"))
+        start, residual = core.begin(lambda speed: self._tool_ramp_s(speed, a))
+        path = ArcPath(core.tool_at(start), via_m, T_end, is_fixed=mode == 1)
+        yield from self._along(path, (v, a, 0.0), residual, start, r)
+
+    def _along(
+        self, tool_path: ToolPath, vat: tuple[float, float, float], residual: Residual | None, start: Array, r: float
+    ) -> Motion:
+        path = TrackedPath(tool_path, start, self._core.kinematics, self._core.T_ft)
+        yield from self._run(path, vat, residual, start, r)
+
+    def _run(
+        self, path: Path, vat: tuple[float, float, float], residual: Residual | None, start: Array, r: float
+    ) -> Motion:
+        core = self._core
+        following = core.follow(path, _profile(path.length, vat, residual), residual)
+        if r <= 0.0:
+            yield from following
+            return
+        goal = core.tool_at(path.end_rad)[:3, 3]
+        within = min(r, 0.5 * float(np.linalg.norm(goal - core.tool_at(start)[:3, 3])))
+        for _ in following:
+            yield
+            if float(np.linalg.norm(core.tool_at(core.nominal_rad)[:3, 3] - goal)) <= within:
+                core.tail = Tail(following, anchor_rad=path.end_rad)
+                return
+
+    def _tool_ramp_s(self, speed: Array, a: float) -> float:
+        twist = self._core.kinematics.jacobian(self._core.setpoint.q_target, self._core.T_ft) @ speed
+        return max(float(np.linalg.norm(twist[:3])), TURN_M_PER_RAD * float(np.linalg.norm(twist[3:]))) / a
+
+
+def _check(a: float, v: float) -> None:
+    if not (a > 0.0 and v > 0.0):
+        raise ValueError(f"move: expected acceleration and speed above 0, got a {a} and v {v}; nothing has moved")
+
+
+def _profile(length: float, vat: tuple[float, float, float], residual: Residual | None) -> Trapezoid:
+    """Return the speed along a path; while a residual runs out no more speed comes in than goes out."""
+    v, a, t = vat
+    if residual is not None:
+        a = min(a, v / residual.duration_s)
+    return Trapezoid(length, v=v, a=a, duration_s=t)

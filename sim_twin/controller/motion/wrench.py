@@ -1,0 +1,71 @@
+"""What the arm's sensors say of forces: contacts of the tool, weight that is not known, torques as currents."""
+
+import mujoco
+import numpy as np
+
+from sim_twin.controller.motion.poses import Array
+
+__all__ = ["NM_PER_A", "ContactWrench", "payload_bias"]
+
+NM_PER_A = np.array([13.6, 13.6, 13.6, 9.1, 9.1, 9.1])
+"""Joint torque over motor current: a torque constant near 0.135 (0.09) Nm/A behind a gear of 101, as published
+identifications of the UR5's large (small) joints have it; recalled, not measured."""
+GRAVITY_M_S2 = 9.81
+
+
+class ContactWrench:
+    """Force and torque that the world puts on the tool's bodies, from the solver's contacts.
+
+    Args:
+        model: The twin's; the tool is the body ``tool`` and what hangs on it.
+    """
+
+    def __init__(self, model: mujoco.MjModel) -> None:
+        tool = model.body("tool").id
+        bodies = {b for b in range(model.nbody) if _hangs_on(model, b, tool)}
+        self._is_tool = np.array([model.geom_bodyid[g] in bodies for g in range(model.ngeom)])
+        self._force = np.zeros(6)
+
+    def at(self, model: mujoco.MjModel, data: mujoco.MjData, point_m: Array) -> Array:
+        """Return force and torque about a point, base axes.  (3,) -> (6,)"""
+        total = np.zeros(6)
+        if not data.ncon:
+            return total
+        sides = self._is_tool[data.contact.geom]
+        for i in np.flatnonzero(sides[:, 0] != sides[:, 1]).tolist():
+            mujoco.mj_contactForce(model, data, i, self._force)
+            R = data.contact.frame[i].reshape(3, 3)
+            # The solver's force acts on the second geom.
+            sign = 1.0 if sides[i, 1] else -1.0
+            force = sign * (self._force[:3] @ R)
+            total[:3] += force
+            total[3:] += sign * (self._force[3:] @ R) + np.cross(data.contact.pos[i] - point_m, force)
+        return total
+
+
+def payload_bias(T_bf: Array, point_m: Array, real: tuple[float, Array], known: tuple[float, Array]) -> Array:
+    """Return what a sensor reads too much because the payload is not the one it was told.
+
+    Args:
+        T_bf: The flange.
+        point_m: Where torques are taken about.
+        real: Mass (kg) and centre of gravity (flange frame) of what hangs on the flange.
+        known: The same, as the controller was told.
+
+    Returns:
+        Force and torque, base axes.  (6,)
+    """
+    wrench = np.zeros(6)
+    for sign, (mass, cog) in ((1.0, real), (-1.0, known)):
+        weight = np.array([0.0, 0.0, -sign * mass * GRAVITY_M_S2])
+        wrench[:3] += weight
+        wrench[3:] += np.cross(T_bf[:3, :3] @ cog + T_bf[:3, 3] - point_m, weight)
+    return wrench
+
+
+def _hangs_on(model: mujoco.MjModel, body: int, root: int) -> bool:
+    while body:
+        if body == root:
+            return True
+        body = int(model.body_parentid[body])
+    return False

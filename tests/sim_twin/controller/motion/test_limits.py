@@ -1,0 +1,140 @@
+import msgspec
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from config.loader import resolve
+from sim_twin.controller.motion.limits import (
+    Asked,
+    Breach,
+    Cause,
+    Felt,
+    Plane,
+    breach_asked,
+    breach_felt,
+    default_limits,
+)
+
+TWO_PI, PI = 2 * np.pi, resolve().arm.joints[0].speed_rad_s
+LIMITS = msgspec.structs.replace(
+    default_limits(resolve().arm),
+    q_min_rad=(-TWO_PI,) * 6,
+    q_max_rad=(TWO_PI,) * 6,
+    planes=(Plane(normal=(0.0, 0.0, 1.0), offset_m=0.1),),
+    tool_speed_m_s=1.5,
+)
+
+
+def at(i, value):
+    out = np.zeros(6)
+    out[i] = value
+    return out
+
+
+TOOL = np.array([0.3, 0, 0.3])
+
+
+def asked(**changes):
+    return Asked(**{"q_rad": np.zeros(6), "qd_rad_s": np.zeros(6), "tool_m": TOOL, "tool_before_m": TOOL} | changes)
+
+
+def felt(**changes):
+    still = {
+        "q_rad": np.zeros(6), "qd_rad_s": np.zeros(6), "q_expected_rad": np.zeros(6), "tool_m": np.array([0, 0, 0.3]),
+        "tool_speed_m_s": 0.0, "force_n": 0.0, "external_nm": np.zeros(6),
+    }  # fmt: skip
+    return Felt(**still | changes)
+
+
+def after(x):
+    return np.nextafter(x, np.inf)
+
+
+def test_standing_still_is_always_allowed():
+    assert breach_asked(LIMITS, asked()) is None
+    assert breach_felt(LIMITS, felt()) is None
+
+
+@pytest.mark.parametrize("joint", range(6))
+@pytest.mark.parametrize("sign", [-1, 1])
+@pytest.mark.parametrize(
+    ("field", "limit", "cause"),
+    [
+        ("q_rad", TWO_PI, Cause.JOINT_LIMIT),
+        ("qd_rad_s", PI * (1 + 1e-9), Cause.TARGET_SPEED),
+        ("qd_rad_s", 2 * PI, Cause.JUMP),
+    ],
+)
+def test_what_is_asked_may_be_at_the_limit_and_not_beyond(joint, sign, field, limit, cause):
+    going = {"qd_rad_s": at(joint, sign * 0.1)}
+    passes = breach_asked(LIMITS, asked(**going | {field: at(joint, sign * limit)}))
+    assert passes is None or passes.cause is not cause
+    breach = breach_asked(LIMITS, asked(**going | {field: at(joint, sign * after(limit))}))
+    assert breach is not None
+    assert (breach.cause, breach.joint, breach.cause.is_violation) == (cause, joint, False)
+
+
+@pytest.mark.parametrize("joint", range(6))
+@pytest.mark.parametrize(
+    ("field", "limits", "cause", "is_violation"),
+    [
+        ("q_rad", [TWO_PI + np.radians(5)] * 6, Cause.JOINT_VIOLATION, True),
+        ("qd_rad_s", [PI + np.radians(1.15)] * 6, Cause.JOINT_SPEED_VIOLATION, True),
+        ("external_nm", LIMITS.collision_nm, Cause.JOINT_COLLISION, False),
+        ("q_expected_rad", [LIMITS.deviation_rad] * 6, Cause.DEVIATION, False),
+    ],
+)
+def test_what_is_felt_may_be_just_below_the_limit_and_not_just_above(joint, field, limits, cause, is_violation):
+    below = breach_felt(LIMITS, felt(**{field: at(joint, limits[joint] - 1e-9)}))
+    assert below is None or below.cause is not cause
+    breach = breach_felt(LIMITS, felt(**{field: at(joint, -limits[joint] - 1e-9)}))
+    assert breach is not None
+    assert (breach.cause, breach.joint, breach.cause.is_violation) == (cause, joint, is_violation)
+
+
+@pytest.mark.parametrize(
+    ("field", "limit", "cause"),
+    [
+        ("tool_speed_m_s", 1.55, Cause.TOOL_SPEED_VIOLATION),
+        ("force_n", 250.0, Cause.TOOL_COLLISION),
+        ("force_n", 275.0, Cause.FORCE_VIOLATION),
+    ],
+)
+def test_speed_and_force_of_the_tool(field, limit, cause):
+    below, above = (breach_felt(LIMITS, felt(**{field: value})) for value in (limit - 1e-9, limit + 1e-9))
+    assert below is None or below.cause is not cause
+    assert above is not None
+    assert above.cause is cause
+
+
+def test_a_plane_stops_what_is_asked_and_four_centimetres_on_what_is_felt():
+    def z(value):
+        return np.array([0.3, 0, value])
+
+    assert breach_asked(LIMITS, asked(tool_m=z(0.1))) is None
+    assert breach_asked(LIMITS, asked(tool_m=z(0.1 - 1e-9))).cause is Cause.PLANE
+    assert breach_asked(LIMITS, asked(tool_m=z(0.09), tool_before_m=z(0.09))) is None, "standing beyond it"
+    assert breach_asked(LIMITS, asked(tool_m=z(0.09), tool_before_m=z(0.08))) is None, "coming back"
+    assert breach_felt(LIMITS, felt(tool_m=z(0.0600001))) is None
+    assert breach_felt(LIMITS, felt(tool_m=z(0.0599999))).cause is Cause.PLANE_VIOLATION
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
+def test_what_is_not_a_number_is_refused(value):
+    assert breach_asked(LIMITS, asked(q_rad=at(2, value))).cause is Cause.NOT_FINITE
+    assert breach_felt(LIMITS, felt(q_rad=at(2, value))) is not None
+
+
+@given(st.lists(st.floats(-10, 10), min_size=6, max_size=6), st.lists(st.floats(-10, 10), min_size=6, max_size=6))
+def test_whatever_passes_is_inside(q, qd):
+    if breach_asked(LIMITS, asked(q_rad=np.array(q), qd_rad_s=np.array(qd))) is None:
+        assert all(abs(a) <= TWO_PI for a, b in zip(q, qd, strict=True) if a * b > 0.0)
+        assert np.abs(qd).max() <= PI * (1 + 1e-8)
+
+
+def test_codes_are_written_as_ur_writes_them():
+    assert Breach(cause=Cause.DEVIATION, text="", joint=2).code == "C153A2"
+    assert Breach(cause=Cause.TOOL_COLLISION, text="").code == "C158A0"
+    assert Breach(cause=Cause.FORCE_VIOLATION, text="").code == ""
+    assert len(list(Cause)) == len({c.value for c in Cause})
