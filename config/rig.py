@@ -30,6 +30,8 @@ class Rig(Section, frozen=True, kw_only=True):
     perception: ImportString
     operator: ImportString | None = None
     """Who arms the station where no hardware is attached; refused by a real arm."""
+    address: Annotated[str, Meta(pattern=r"^[A-Za-z0-9._:-]{1,253}\Z")] | None = None
+    """Host or IP address of the arm's controller, where it has one."""
     expected: PlantExpected
     tick_s: Annotated[float, Meta(ge=0.002, le=0.05)] = 0.01
     physics_s: Annotated[float, Meta(ge=0.0005, le=0.01)] = 0.002

@@ -4,7 +4,7 @@ import math
 
 from robot.messages import Quat, Vec3
 
-__all__ = ["inside_box", "tool_offset", "turn_about_vertical"]
+__all__ = ["inside_box", "quat_of_rotation_vector", "tool_offset", "turn_about_vertical"]
 
 
 def tool_offset(point_m: Vec3, tcp_m: Vec3, yaw_rad: float) -> Vec3:
@@ -30,3 +30,12 @@ def turn_about_vertical(quat: Quat) -> float:
     """Return the yaw in (-pi, pi] of a unit quaternion, scalar first: the angle of its turned x axis in the plane."""
     w, x, y, z = quat
     return math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+
+
+def quat_of_rotation_vector(rx: float, ry: float, rz: float) -> Quat:
+    """Return the unit quaternion, scalar first, of a turn by the vector's length about its direction."""
+    angle = math.sqrt(rx * rx + ry * ry + rz * rz)
+    if angle < 1e-12:
+        return 1.0, rx / 2.0, ry / 2.0, rz / 2.0
+    share = math.sin(angle / 2.0) / angle
+    return math.cos(angle / 2.0), rx * share, ry * share, rz * share

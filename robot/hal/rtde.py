@@ -1,0 +1,396 @@
+"""A UR5e over RTDE: the genuine ur_rtde client behind the Arm door. PolyScope 5.
+
+Connecting reads only: the receive and dashboard clients. The control client uploads a script and stops whatever program
+runs, so it is made by `engage`, after somebody has armed. It never outlives a stop or a stale state, because it would
+go on by itself where it was left: it repeats a command after a reconnection, and the script acts on the registers' last
+values. Whoever wants to move again makes a new one, by `engage`.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
+from time import monotonic_ns
+from typing import Any
+
+from dashboard_client import DashboardClient
+from rtde_control import RTDEControlInterface
+from rtde_io import RTDEIOInterface
+from rtde_receive import RTDEReceiveInterface
+
+from config.arm import ArmConfig
+from config.rig import Rig
+from config.scenario import Scenario
+from robot.errors import NotEngagedError, RobotConfigError, StaleStateError, WireError
+from robot.geometry import quat_of_rotation_vector
+from robot.hal.protocols import Camera, Resetter, SceneTruth
+from robot.hal.robotiq import GripScale, RobotiqGripper
+from robot.hal.ur_checks import check_facts, check_pose
+from robot.hal.ur_primary import read_facts
+from robot.hal.ur_state import (
+    ArmRefusedError,
+    Runtime,
+    UrStatus,
+    check_ready,
+    check_version,
+    kind_of_address,
+    mode_of,
+    parse_version,
+    why_refused,
+)
+from robot.messages import ArmCommand, ArmSpec, ArmState, PlantIdentity, Vec6
+
+__all__ = ["RtdeArm", "RtdeClock", "RtdePlant"]
+
+RATE_HZ = 500.0
+TICK_NS = 2_000_000
+STALE_NS = 50_000_000
+N_BITS = 16
+N_STANDARD = 8
+"""Outputs below are standard ones, the rest configurable ones of the control box."""
+WATCHDOG_HZ = 10.0
+"""Commands that come less often stop the program on the controller's side."""
+PROOF_S = 0.5
+"""Time in which an armed and starved watchdog must have stopped the program."""
+PAYLOAD_TOLERANCE_KG, TCP_TOLERANCE = 0.05, 1e-4
+STOP_RAD_S2, REST_S, STILL_RAD_S = 10.0, 1.0, 0.01
+START_S = 2.0
+
+
+class RtdeClock:
+    """Wall time on the client's own pacing. A tick that was missed is skipped and counted."""
+
+    def __init__(self) -> None:
+        self._pacer: RTDEReceiveInterface | None = None
+        self._start: Any = None
+        self._due_ns = 0
+
+    def pace_by(self, pacer: RTDEReceiveInterface | None) -> None:
+        """Take the client that waits; None ends waiting."""
+        self._pacer = pacer
+        if pacer is not None:
+            self._start, self._due_ns = pacer.initPeriod(), monotonic_ns() + TICK_NS
+
+    def now_ns(self) -> int:
+        """Return the host's monotonic time in nanoseconds."""
+        return monotonic_ns()
+
+    def wait_tick(self) -> int:
+        """Wait for the end of the period in hand and return how many whole periods were missed."""
+        if self._pacer is None:
+            raise StaleStateError("arm: expected connect() before waiting for its ticks")
+        self._pacer.waitPeriod(self._start)
+        self._start = self._pacer.initPeriod()
+        now_ns = monotonic_ns()
+        n_missed = max(0, (now_ns - self._due_ns) // TICK_NS)
+        self._due_ns = now_ns + TICK_NS
+        return int(n_missed)
+
+
+class RtdeArm:
+    """One UR5e with a Robotiq hand (robot.hal.protocols.Arm)."""
+
+    def __init__(self, *, arm: ArmConfig, address: str) -> None:
+        """Store. Nothing is acquired.
+
+        Args:
+            arm: the arm's file.
+            address: host or IP address of the controller.
+        """
+        joints = arm.joints
+        self.spec = ArmSpec(
+            model=arm.name, rate_hz=RATE_HZ, n_inputs=N_BITS, n_outputs=N_BITS,
+            q_min_rad=_vec6([j.range_rad[0] for j in joints]), q_max_rad=_vec6([j.range_rad[1] for j in joints]),
+            qd_max_rad_s=_vec6([j.speed_rad_s for j in joints]), grip_stroke_m=arm.tool.stroke_m,
+        )  # fmt: skip
+        self.clock = RtdeClock()
+        self.address = address
+        self.serial = ""
+        """As the controller says, from connect() on."""
+        self._arm = arm
+        self._receive: RTDEReceiveInterface | None = None
+        self._dashboard: DashboardClient | None = None
+        self._control: RTDEControlInterface | None = None
+        self._outputs: RTDEIOInterface | None = None
+        self._gripper = RobotiqGripper(GripScale.of(arm.tool))
+        self._last_timestamp, self._seen_ns = -1.0, 0
+        self._put_bits = 0
+
+    # ----------------------------------------------------------------------------------------------------- acquire
+
+    def connect(self) -> None:
+        """Open the clients that read, and check that this is the arm of the file. Moves nothing, stops nothing.
+
+        Raises:
+            WireError: somebody does not answer.
+            RobotConfigError: another model or software than this backend is for.
+        """
+        if self._receive is not None:
+            return
+        facts = read_facts(self.address)
+        dashboard = DashboardClient(self.address)
+        with _named("dashboard", self.address):
+            dashboard.connect()
+            version = parse_version(dashboard.polyscopeVersion())
+        check_version(version)
+        check_facts(facts, self._arm)
+        check_pose(facts)
+        with _named("RTDE", self.address):
+            self._receive = RTDEReceiveInterface(self.address, RATE_HZ)
+            self.serial = dashboard.getSerialNumber().strip()
+        self._dashboard = dashboard
+        self._gripper.connect(self.address)
+        self.clock.pace_by(self._receive)
+        self._wait_first_state()
+
+    def engage(self) -> None:
+        """Take command of the arm. From here on `write` moves it; nothing moves yet but a hand that needs activating.
+
+        Raises:
+            ArmRefusedError: the arm is not ready, or belongs to somebody else, or its watchdog does not work.
+        """
+        receive, dashboard = self._reading()
+        self._drop_control()
+        check_ready(self.status(), is_remote=_is_remote(dashboard))
+        control = self._take_control()
+        self._prove_watchdog(control)
+        self._control = control = self._take_control()
+        self._set_up(control, receive)
+        self._require(control.setWatchdog(WATCHDOG_HZ), "setWatchdog")
+        self._outputs = RTDEIOInterface(self.address)
+        self._put_bits = receive.getActualDigitalOutputBits() & _ALL_BITS
+        if not self._gripper.is_active:
+            self._gripper.activate()
+
+    # ------------------------------------------------------------------------------------------------ read and write
+
+    def read(self) -> ArmState:
+        """Return the newest state.
+
+        Raises:
+            StaleStateError: not connected, or the controller's own time has stood still for 50 ms.
+            WireError: the hand does not answer.
+        """
+        receive, _ = self._reading()
+        self._note_freshness(receive)
+        grip = self._gripper.poll()
+        if grip is None:
+            raise StaleStateError("arm: expected a state of the hand, none came yet")
+        x, y, z, rx, ry, rz = receive.getActualTCPPose()
+        fx, fy, fz, *_ = receive.getActualTCPForce()
+        return ArmState(
+            stamp_ns=self._seen_ns,
+            q_rad=_vec6(receive.getActualQ()),
+            qd_rad_s=_vec6(receive.getActualQd()),
+            tcp_position_m=(x, y, z),
+            tcp_quat=quat_of_rotation_vector(rx, ry, rz),
+            tcp_force_n=(fx, fy, fz),
+            grip=grip,
+            digital_in=receive.getActualDigitalInputBits() & _ALL_BITS,
+            digital_out=receive.getActualDigitalOutputBits() & _ALL_BITS,
+            mode=mode_of(self.status()),
+        )
+
+    def write(self, command: ArmCommand) -> None:
+        """Send joint targets, and grip and outputs where they changed. Only the gate calls this.
+
+        Raises:
+            NotEngagedError: nobody took command, or the arm was stopped since.
+            ArmRefusedError: the controller did not take it.
+        """
+        if self._control is None:
+            raise NotEngagedError("arm: expected connect() and engage() before write(), and again after a stop")
+        servo = self._arm.servo
+        taken = self._control.servoJ(
+            list(command.q_rad), 0.0, 0.0, 1.0 / RATE_HZ, servo.lookahead_s, servo.gain
+        )  # fmt: skip
+        self._require(taken, "servoJ")
+        self._gripper.command(command.grip)
+        self._put_outputs(command.digital_out)
+
+    def stop(self) -> bool:
+        """Bring the arm to rest and give up command; the hand keeps its grip. Returns whether rest was seen."""
+        if self._control is not None:
+            with suppress(RuntimeError):
+                self._control.servoStop(STOP_RAD_S2)
+        is_resting = self._wait_rest()
+        self._drop_control()
+        return is_resting
+
+    def close(self) -> None:
+        """Stop, and close every client. Idempotent, never raises."""
+        if self._receive is None:
+            return
+        self.stop()
+        self.clock.pace_by(None)
+        receive, dashboard, self._receive, self._dashboard = self._receive, self._dashboard, None, None
+        with suppress(RuntimeError):
+            receive.disconnect()
+        with suppress(RuntimeError):
+            if dashboard is not None:
+                dashboard.disconnect()
+        self._gripper.close()
+
+    def status(self) -> UrStatus:
+        """Return what the controller said last of its modes."""
+        receive, _ = self._reading()
+        return UrStatus(
+            robot_mode=receive.getRobotMode(),
+            safety_bits=receive.getSafetyStatusBits(),
+            runtime=int(receive.getRuntimeState()),
+            speed_fraction=receive.getTargetSpeedFraction(),
+        )
+
+    # -------------------------------------------------------------------------------------------------------- inside
+
+    def _reading(self) -> tuple[RTDEReceiveInterface, DashboardClient]:
+        if self._receive is None or self._dashboard is None:
+            raise StaleStateError("arm: expected connect() before read(); nothing was read")
+        return self._receive, self._dashboard
+
+    def _note_freshness(self, receive: RTDEReceiveInterface) -> None:
+        """Judge age by the controller's own time: the client says connected, and serves old data, after a drop."""
+        timestamp, now_ns = receive.getTimestamp(), monotonic_ns()
+        if timestamp != self._last_timestamp:
+            self._last_timestamp, self._seen_ns = timestamp, now_ns
+        elif now_ns - self._seen_ns > STALE_NS:
+            age_ms = (now_ns - self._seen_ns) / 1e6
+            raise StaleStateError(
+                f"arm: expected a state every 2 ms, the newest is {age_ms:.0f} ms old; is the link up?"
+            )
+
+    def _wait_first_state(self) -> None:
+        deadline_ns = monotonic_ns() + round(START_S * 1e9)
+        while True:
+            try:
+                self.read()
+            except StaleStateError:
+                if monotonic_ns() > deadline_ns:
+                    raise
+                self.clock.wait_tick()
+            else:
+                return
+
+    def _take_control(self) -> RTDEControlInterface:
+        with _named("RTDE control", self.address):
+            return RTDEControlInterface(self.address, RATE_HZ, RTDEControlInterface.FLAG_UPLOAD_SCRIPT)
+
+    def _prove_watchdog(self, control: RTDEControlInterface) -> None:
+        """Arm the controller's watchdog, starve it, and see the program end. Nothing has moved yet."""
+        self._require(control.setWatchdog(WATCHDOG_HZ), "setWatchdog")
+        deadline_ns = monotonic_ns() + round(PROOF_S * 1e9)
+        while monotonic_ns() < deadline_ns:
+            self.clock.wait_tick()
+            if self.status().runtime == Runtime.STOPPED:
+                control.disconnect()
+                return
+        control.stopScript()
+        control.disconnect()
+        raise ArmRefusedError(
+            f"expected the controller's watchdog to end a program that is silent for {1e3 / WATCHDOG_HZ:.0f} ms, "
+            f"it ran on for {PROOF_S:g} s: do not move this arm"
+        )
+
+    def _set_up(self, control: RTDEControlInterface, receive: RTDEReceiveInterface) -> None:
+        """Set payload and tool centre point, and read both back."""
+        tool = self._arm.tool
+        tcp = [*tool.tcp_m, 0.0, 0.0, 0.0]
+        self._require(control.setPayload(tool.mass_kg, list(tool.com_m)), "setPayload")
+        self._require(control.setTcp(tcp), "setTcp")
+        if any(abs(a - b) > TCP_TOLERANCE for a, b in zip(control.getTCPOffset(), tcp, strict=True)):
+            raise ArmRefusedError(f"expected tool centre point {tcp}, the controller says {control.getTCPOffset()}")
+        deadline_ns = monotonic_ns() + round(PROOF_S * 1e9)
+        while abs(receive.getPayload() - tool.mass_kg) > PAYLOAD_TOLERANCE_KG:
+            if monotonic_ns() > deadline_ns:
+                raise ArmRefusedError(f"expected payload {tool.mass_kg} kg, the controller says {receive.getPayload()}")
+            self.clock.wait_tick()
+
+    def _drop_control(self) -> None:
+        """End the program and forget its client: it must never get the chance to go on by itself."""
+        control, self._control = self._control, None
+        outputs, self._outputs = self._outputs, None
+        with suppress(RuntimeError):
+            if control is not None:
+                control.stopScript()
+                control.disconnect()
+        with suppress(RuntimeError):
+            if outputs is not None:
+                outputs.disconnect()
+
+    def _put_outputs(self, digital_out: int) -> None:
+        changed = self._put_bits ^ digital_out
+        for i in range(N_BITS):
+            if changed >> i & 1:
+                self._put_output(i, is_on=bool(digital_out >> i & 1))
+        self._put_bits = digital_out
+
+    def _put_output(self, i: int, *, is_on: bool) -> None:
+        assert self._outputs is not None, "engage made it"
+        if i < N_STANDARD:
+            taken = self._outputs.setStandardDigitalOut(i, is_on)
+        else:
+            taken = self._outputs.setConfigurableDigitalOut(i - N_STANDARD, is_on)
+        self._require(taken, f"digital output {i}")
+
+    def _require(self, is_taken: bool, what: str) -> None:
+        if not is_taken:
+            raise ArmRefusedError(f"{what}: the controller did not take it: {why_refused(self.status())}")
+
+    def _wait_rest(self) -> bool:
+        """Wait until the joints rest, at most REST_S. Returns whether they do."""
+        if self._receive is None:
+            return True
+        deadline_ns = monotonic_ns() + round(REST_S * 1e9)
+        while monotonic_ns() < deadline_ns:
+            try:
+                state = self.read()
+                self.clock.wait_tick()
+            except WireError:
+                return False
+            if max(abs(v) for v in state.qd_rad_s) < STILL_RAD_S:
+                return True
+        return False
+
+
+class RtdePlant:
+    """A UR5e at an address: real, or a virtual controller on this machine's loopback."""
+
+    def __init__(self, *, arm: ArmConfig, scenario: Scenario, rig: Rig) -> None:
+        """Store. Nothing is acquired.
+
+        Raises:
+            RobotConfigError: the rig names no address, or its ticks are not the arm's.
+        """
+        if rig.address is None:
+            raise RobotConfigError(f"rig {rig.name}: expected an address for its arm, came none")
+        if round(rig.tick_s * 1e9) != TICK_NS:
+            raise RobotConfigError(f"rig {rig.name}: expected tick_s 0.002, as the arm's, came {rig.tick_s}")
+        self._kind, self._scenario = kind_of_address(rig.address), scenario
+        self.arm = RtdeArm(arm=arm, address=rig.address)
+        self.cameras: Mapping[str, Camera] = {}
+        self.truth: SceneTruth | None = None
+        self.resetter: Resetter
+
+    @property
+    def identity(self) -> PlantIdentity:
+        """What the controller says it is, from connect() on; before that its serial is empty."""
+        return PlantIdentity(kind=self._kind, model=self.arm.spec.model, serial=self.arm.serial)
+
+
+@contextmanager
+def _named(what: str, address: str) -> Iterator[None]:
+    """Turn what the client throws, which is of one kind for all, into an error that says who did not answer."""
+    try:
+        yield
+    except RuntimeError as error:
+        raise WireError(f"{what}: expected an answer at {address}, got: {error}") from error
+
+
+def _is_remote(dashboard: DashboardClient) -> bool:
+    return bool(dashboard.isInRemoteControl())
+
+
+def _vec6(values: Sequence[float]) -> Vec6:
+    a, b, c, d, e, f = values
+    return a, b, c, d, e, f
+
+
+_ALL_BITS = (1 << N_BITS) - 1

@@ -1,0 +1,121 @@
+"""The primary interface, as far as it tells what the arm is made of: calibrated DH and the limits set on it.
+
+Layout: UR, "Remote control via TCP/IP" (client interfaces): a package is a uint32 size and a uint8 type; robot state
+(type 16) is a sequence of sub-packages of the same form. Numbers are big-endian.
+"""
+
+import socket
+import struct
+from collections.abc import Sequence
+
+import msgspec
+
+from robot.errors import WireError
+from robot.messages import Vec6
+
+__all__ = ["PRIMARY_PORT", "ArmFacts", "parse_facts", "read_facts"]
+
+PRIMARY_PORT = 30001
+ROBOT_STATE, JOINTS, CARTESIAN, KINEMATICS, CONFIGURATION = 16, 1, 4, 5, 6
+JOINT_BYTES = 41
+LARGEST = 1 << 16
+_HEADER = struct.Struct(">IB")
+_VEC6 = struct.Struct(">6d")
+_DOUBLE = struct.Struct(">d")
+_RANGES = struct.Struct(">12d")
+
+
+class ArmFacts(msgspec.Struct, frozen=True, kw_only=True):
+    """What one arm is made of, joints base to wrist 3."""
+
+    theta_rad: Vec6
+    a_m: Vec6
+    d_m: Vec6
+    alpha_rad: Vec6
+    q_min_rad: Vec6
+    q_max_rad: Vec6
+    qd_max_rad_s: Vec6
+    q_rad: Vec6
+    """Where the joints were when it told."""
+    tcp_pose: Vec6
+    """Where it said its tool was, at the same instant: metres and a rotation vector, base frame."""
+    tcp_offset: Vec6
+    """The tool that is set now, in the flange frame, likewise."""
+
+
+def parse_facts(package: bytes) -> ArmFacts | None:
+    """Return the facts in one package, None where it does not carry all of them."""
+    if len(package) < _HEADER.size or package[4] != ROBOT_STATE:
+        return None
+    parts = dict(_sub_packages(package))
+    if not {JOINTS, CARTESIAN, KINEMATICS, CONFIGURATION} <= set(parts):
+        return None
+    kinematics, configuration, cartesian = parts[KINEMATICS], parts[CONFIGURATION], parts[CARTESIAN]
+    try:
+        theta, a, d, alpha = (_VEC6.unpack_from(kinematics, 24 + 48 * k) for k in range(4))
+        ranges = _RANGES.unpack_from(configuration, 0)
+        speeds = _RANGES.unpack_from(configuration, 96)
+        tcp_pose, tcp_offset = _VEC6.unpack_from(cartesian, 0), _VEC6.unpack_from(cartesian, 48)
+        q_rad = _vec6([_DOUBLE.unpack_from(parts[JOINTS], JOINT_BYTES * i)[0] for i in range(6)])
+    except struct.error as error:
+        raise WireError(f"primary interface: expected kinematics and configuration in full, {error}") from error
+    return ArmFacts(
+        theta_rad=theta, a_m=a, d_m=d, alpha_rad=alpha,
+        q_min_rad=_every_other(ranges, 0), q_max_rad=_every_other(ranges, 1), qd_max_rad_s=_every_other(speeds, 0),
+        q_rad=q_rad, tcp_pose=tcp_pose, tcp_offset=tcp_offset,
+    )  # fmt: skip
+
+
+def read_facts(host: str, *, timeout_s: float = 3.0, n_packages: int = 200) -> ArmFacts:
+    """Connect, listen until the facts come, and disconnect. Sends nothing.
+
+    Raises:
+        WireError: nobody listens, or the facts do not come.
+    """
+    try:
+        with socket.create_connection((host, PRIMARY_PORT), timeout=timeout_s) as link:
+            for _ in range(n_packages):
+                facts = parse_facts(_package(link))
+                if facts is not None:
+                    return facts
+    except OSError as error:
+        raise WireError(f"primary interface: expected an answer at {host}:{PRIMARY_PORT}, got {error}") from error
+    raise WireError(f"primary interface: expected kinematics within {n_packages} packages, they did not come")
+
+
+def _package(link: socket.socket) -> bytes:
+    head = _exactly(link, _HEADER.size)
+    size, _ = _HEADER.unpack(head)
+    if not _HEADER.size <= size <= LARGEST:
+        raise WireError(f"primary interface: expected a package of 5 to {LARGEST} bytes, came {size}")
+    return head + _exactly(link, size - _HEADER.size)
+
+
+def _exactly(link: socket.socket, n: int) -> bytes:
+    chunks = b""
+    while len(chunks) < n:
+        chunk = link.recv(n - len(chunks))
+        if not chunk:
+            raise WireError("primary interface: expected a package, the connection was closed by the other side")
+        chunks += chunk
+    return chunks
+
+
+def _sub_packages(package: bytes) -> list[tuple[int, bytes]]:
+    parts, at = [], _HEADER.size
+    while at + _HEADER.size <= len(package):
+        size, kind = _HEADER.unpack_from(package, at)
+        if size < _HEADER.size:
+            break
+        parts.append((kind, package[at + _HEADER.size : at + size]))
+        at += size
+    return parts
+
+
+def _every_other(values: tuple[float, ...], first: int) -> Vec6:
+    return _vec6(values[first::2])
+
+
+def _vec6(values: Sequence[float]) -> Vec6:
+    a, b, c, d, e, f = values
+    return a, b, c, d, e, f

@@ -1,0 +1,139 @@
+"""What a UR controller says of itself, read: mode and safety bits, versions, and why it did not do as told. Pure.
+
+Numbers are those of UR's RTDE guide: robot_mode, runtime_state and the bits of safety_status_bits.
+"""
+
+import ipaddress
+import socket
+
+import msgspec
+
+from robot.errors import RobotConfigError, SafetyError, WireError
+from robot.messages import ArmMode, PlantKind
+
+__all__ = [
+    "ArmRefusedError",
+    "Runtime",
+    "UrStatus",
+    "check_ready",
+    "check_version",
+    "kind_of_address",
+    "mode_of",
+    "parse_version",
+    "why_refused",
+]
+
+RUNNING, IDLE, POWER_OFF = 7, 5, 3
+OLDEST_MINOR = 6
+"""First version of PolyScope 5 whose dashboard tells whether the arm is in remote control."""
+FULL_SPEED = 0.99
+
+_ROBOT_MODES = {
+    -1: "no controller", 0: "disconnected", 1: "confirm safety", 2: "booting", 3: "power off", 4: "power on",
+    5: "idle, brakes on", 6: "backdrive", 7: "running", 8: "updating firmware",
+}  # fmt: skip
+_SAFETY_BITS = (
+    (2, "protective stop"), (4, "safeguard stop"), (5, "system emergency stop"), (6, "robot emergency stop"),
+    (7, "emergency stop"), (8, "safety violation"), (9, "safety fault"), (10, "stopped due to safety"), (3, "recovery"),
+)  # fmt: skip
+_EMERGENCY = 1 << 5 | 1 << 6 | 1 << 7
+_STOPPED = 1 << 2 | 1 << 3 | 1 << 4 | 1 << 8 | 1 << 9 | 1 << 10
+
+
+class ArmRefusedError(SafetyError, WireError):
+    """The controller did not do what it was told; the client says False and nothing more."""
+
+
+class Runtime:
+    """Values of runtime_state."""
+
+    STOPPING, STOPPED, PLAYING, PAUSING, PAUSED, RESUMING = range(6)
+
+
+class UrStatus(msgspec.Struct, frozen=True, kw_only=True):
+    """What the controller said last."""
+
+    robot_mode: int
+    safety_bits: int
+    runtime: int
+    speed_fraction: float = 1.0
+    """Of the speed slider and whatever else slows motion down."""
+
+
+def mode_of(status: UrStatus) -> ArmMode:
+    """Return our mode for the controller's."""
+    if status.safety_bits & _EMERGENCY:
+        return ArmMode.EMERGENCY_STOP
+    if status.safety_bits & _STOPPED:
+        return ArmMode.PROTECTIVE_STOP
+    if status.robot_mode == RUNNING:
+        return ArmMode.RUNNING
+    return ArmMode.IDLE if status.robot_mode == IDLE else ArmMode.STOPPED
+
+
+def why_refused(status: UrStatus) -> str:
+    """Return the most likely reason why the controller did not obey, in words."""
+    reasons = [name for bit, name in _SAFETY_BITS if status.safety_bits >> bit & 1]
+    if status.robot_mode != RUNNING:
+        reasons.append(f"the arm is not running ({_ROBOT_MODES.get(status.robot_mode, status.robot_mode)})")
+    if not reasons and status.runtime != Runtime.PLAYING:
+        reasons.append("the program on the controller has ended (watchdog, a person, or an error in its log)")
+    return ", ".join(reasons) or "no reason is visible in its state; look at the log on the pendant"
+
+
+def check_ready(status: UrStatus, *, is_remote: bool) -> None:
+    """Refuse to take an arm that is not ready, or that somebody else uses.
+
+    Raises:
+        ArmRefusedError: not in remote control, not running, stopped by safety, slowed down, or a program runs.
+    """
+    if not is_remote:
+        raise ArmRefusedError("expected the arm in remote control, it is in local: switch it at the top right corner")
+    if mode_of(status) is not ArmMode.RUNNING:
+        raise ArmRefusedError(f"expected an arm that runs and is not stopped, came: {why_refused(status)}")
+    if status.runtime not in (Runtime.STOPPED, Runtime.STOPPING):
+        raise ArmRefusedError("expected no program on the arm, one is running: whoever started it must stop it")
+    if status.speed_fraction < FULL_SPEED:
+        percent = round(100 * status.speed_fraction)
+        raise ArmRefusedError(
+            f"expected the speed slider at 100 %, it is at {percent} %: motion would trail its targets"
+        )
+
+
+def parse_version(text: str) -> tuple[int, ...]:
+    """Return the numbers of `URSoftware 5.21.0.1234` or alike.
+
+    Raises:
+        WireError: there is no version in it.
+    """
+    for word in text.replace("(", " ").split():
+        numbers = word.split(".")
+        if len(numbers) >= 3 and all(n.isdigit() for n in numbers):
+            return tuple(int(n) for n in numbers)
+    raise WireError(f"expected a version from the dashboard, came {text!r}")
+
+
+def check_version(version: tuple[int, ...]) -> None:
+    """Refuse what this backend was never tried with.
+
+    Raises:
+        RobotConfigError: not PolyScope 5, or too old.
+    """
+    if version[0] >= 10:
+        raise RobotConfigError("expected PolyScope 5, came PolyScope X: it has no dashboard and no tested gripper port")
+    if version[0] != 5 or version[1] < OLDEST_MINOR:
+        came = ".".join(map(str, version))
+        raise RobotConfigError(f"expected PolyScope 5.{OLDEST_MINOR} or newer of the 5 series, came {came}")
+
+
+def kind_of_address(address: str) -> PlantKind:
+    """Return what stands at an address: on this machine's loopback only a virtual controller can be.
+
+    Raises:
+        RobotConfigError: the address leads nowhere.
+    """
+    try:
+        resolved = ipaddress.ip_address(socket.gethostbyname(address))
+    except (OSError, ValueError) as error:
+        raise RobotConfigError(f"address: expected a host or IP address, came {address!r}: {error}") from error
+    return PlantKind.VIRTUAL if resolved.is_loopback else PlantKind.REAL
