@@ -93,7 +93,9 @@ def test_a_command_arrives_in_the_grippers_bytes_and_the_same_again_sends_nothin
     assert (bench.fingers.asked.pos, bench.fingers.asked.force) == (0, 255)
 
 
-@pytest.mark.parametrize(("obj", "is_moving", "has_object"), [(0, True, False), (1, False, False), (2, False, True), (3, False, False)])  # fmt: skip
+@pytest.mark.parametrize(
+    ("obj", "is_moving", "has_object"), [(0, True, False), (1, False, False), (2, False, True), (3, False, False)]
+)
 def test_only_a_closing_that_was_stopped_holds_an_object(bench, obj, is_moving, has_object):
     bench.fingers.measured = GripperMeasurement(pos=120, pre=255, sta=3, obj=obj)
     bench.gripper.command(grip(0.0))  # its acknowledgement comes without an end of line, before the next answer
