@@ -36,4 +36,5 @@ class Rig(Section, frozen=True, kw_only=True):
     tick_s: Annotated[float, Meta(ge=0.002, le=0.05)] = 0.01
     physics_s: Annotated[float, Meta(ge=0.0005, le=0.01)] = 0.002
     max_latches: Annotated[int, Meta(ge=0, le=10_000)] = 20
-    """More latches than this and a run fails."""
+    """More latches than this within latch_window resets and a run fails: something is wrong that no reset mends."""
+    latch_window: Annotated[int, Meta(ge=1, le=100_000)] = 200

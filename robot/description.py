@@ -182,7 +182,7 @@ def _add_finger(palm: mujoco.MjsBody, arm: ArmConfig, name: str, side: float, ma
     tool = arm.tool
     thick, wide, tall = tool.pad_size_m
     tip_z = tool.tcp_m[2] + tool.tip_below_tcp_m
-    bumper = 0.004
+    bumper = 0.008  # of rubber that gives: a stiff fingertip meets what it runs into with 700 N
     body = palm.add_body(name=f"finger_{name}", gravcomp=1)
     body.explicitinertial = True
     body.mass = mass

@@ -67,7 +67,7 @@ class LocalStation:
         self._plant, self._perception, self._rig = plant, perception, rig
         self._loop = TickLoop(arm=plant.arm, config=arm, scenario=scenario, rule_sets=rule_sets, rig=rig)
         self._reflexes = HandReflexes(arm=arm, scenario=scenario)
-        self._arming = Arming(expected=rig.expected, max_latches=rig.max_latches)
+        self._arming = Arming(expected=rig.expected, max_latches=rig.max_latches, latch_window=rig.latch_window)
         self._spec = StationSpec(
             n_distances=len(scenario.distances),
             n_buttons=len(scenario.buttons),

@@ -17,6 +17,8 @@ from sim_twin.names import on_table
 __all__ = ["LEAF_THICKNESS_M", "build_scene", "leaf_names"]
 
 LEAF_THICKNESS_M = 0.005
+PADDING_M = 0.012
+"""On top of a leaf. A finger that pressed through a thin leaf to its middle was pushed out below, and stuck there."""
 # Nm/rad. Droop stays under 0.5 mm with the tool's weight compensated; a servo three times as stiff makes a carried
 # object creep 2 mm, because implicitfast changes the velocity step after the contacts were solved.
 SERVO_STIFFNESS = (6_000.0, 6_000.0, 6_000.0, 1_200.0, 1_200.0, 1_200.0)
@@ -155,8 +157,8 @@ def _add_box(spec: mujoco.MjSpec, box: Box, table_m: float) -> None:
             limited=mujoco.mjtLimited.mjLIMITED_TRUE, damping=0.02, armature=0.0005,
         )  # fmt: skip
         hinge.add_geom(
-            name=name, type=_BOX, size=[(leaf - 0.001) / 2, ly / 2 + w, LEAF_THICKNESS_M / 2],
-            pos=[-sign * (leaf - 0.001) / 2, 0, 0], mass=0.06, rgba=[*_dim(box.colour, 0.86), 1],
+            name=name, type=_BOX, size=[(leaf - 0.001) / 2, ly / 2 + w, (LEAF_THICKNESS_M + PADDING_M) / 2],
+            pos=[-sign * (leaf - 0.001) / 2, 0, PADDING_M / 2], mass=0.06, rgba=[*_dim(box.colour, 0.86), 1],
             **_PADDED,
         )  # fmt: skip
         torque = box.lid.force_n * leaf

@@ -1,5 +1,6 @@
 """From disarmed to engaged and back: who may arm, and what a latch takes to clear."""
 
+from collections import deque
 from typing import Protocol
 
 from config.rig import PlantExpected
@@ -62,9 +63,12 @@ class Arming:
         n_latches: How often the station has latched since it was made.
     """
 
-    def __init__(self, *, expected: PlantExpected, max_latches: int) -> None:
+    def __init__(self, *, expected: PlantExpected, max_latches: int, latch_window: int) -> None:
         self._expected = expected
-        self._max_latches = max_latches
+        self._max_latches, self._latch_window = max_latches, latch_window
+        self._n_resets = 0
+        self._latched_at = deque[int](maxlen=max_latches + 1)
+        """Resets there had been at each of the newest latches."""
         self._mode = StationMode.DISARMED
         self._reason = ""
         self._is_plant_reset = False
@@ -108,23 +112,27 @@ class Arming:
         self._mode = StationMode.LATCHED
         self._reason = reason
         self._is_plant_reset = False
+        self._latched_at.append(self._n_resets)
         self.n_latches += 1
 
     def note_plant_reset(self) -> None:
         """The plant was reset: a latch may now be cleared by an operator. Clears nothing itself."""
         self._is_plant_reset = True
+        self._n_resets += 1
 
     def clear_latch(self, *, identity: PlantIdentity, by: str) -> None:
         """Go from latched to armed.
 
         Raises:
-            TooManyLatchesError: the run has latched more often than it may.
+            TooManyLatchesError: it has latched too often lately.
             SafetyError: the plant was not reset since the latch, or is not the one the rig names.
         """
         self._require(StationMode.LATCHED, "clear a latch")
-        if self.n_latches > self._max_latches:
+        n_lately = sum(self._n_resets - at < self._latch_window for at in self._latched_at)
+        if n_lately > self._max_latches:
             raise TooManyLatchesError(
-                f"latched {self.n_latches} times, at most {self._max_latches} a run; last: {self._reason}"
+                f"expected at most {self._max_latches} latches in {self._latch_window} resets, came {n_lately}; "
+                f"last: {self._reason}"
             )
         if not self._is_plant_reset:
             raise SafetyError(f"latched ({self._reason}): reset the plant before clearing the latch")

@@ -10,7 +10,7 @@ IDENTITY = PlantIdentity(kind=PlantKind.FAKE, model="ur5e", serial="fake")
 
 @pytest.fixture
 def arming():
-    return Arming(expected=PlantExpected(kind="fake", model="ur5e", serial="fake"), max_latches=2)
+    return Arming(expected=PlantExpected(kind="fake", model="ur5e", serial="fake"), max_latches=2, latch_window=10)
 
 
 def engage(arming):
@@ -99,7 +99,7 @@ def test_too_many_latches_fail_the_run(arming):
     engage(arming)
     latch_and_clear(arming)
     latch_and_clear(arming)
-    with pytest.raises(TooManyLatchesError, match="3 times, at most 2"):
+    with pytest.raises(TooManyLatchesError, match="at most 2 latches in 10 resets, came 3"):
         latch_and_clear(arming)
     assert arming.state.mode is StationMode.LATCHED
 
@@ -109,3 +109,19 @@ def test_disarming_takes_motion_away(arming):
     arming.disarm()
     assert arming.state.mode is StationMode.DISARMED
     assert not arming.is_engaged
+
+
+def test_latches_long_ago_are_not_held_against_a_run(arming):
+    engage(arming)
+    for _ in range(12):
+        arming.latch("bump")
+        for _ in range(6):
+            arming.note_plant_reset()
+        arming.clear_latch(identity=IDENTITY, by="tester")
+        arming.engage()
+    latch_and_clear(arming)
+    assert arming.n_latches == 13
+    arming.latch("again")
+    arming.note_plant_reset()
+    with pytest.raises(TooManyLatchesError, match="at most 2 latches in 10 resets, came 3"):
+        arming.clear_latch(identity=IDENTITY, by="tester")
