@@ -6,10 +6,9 @@ go on by itself where it was left: it repeats a command after a reconnection, an
 values. Whoever wants to move again makes a new one, by `engage`.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from time import monotonic_ns
-from typing import Any
 
 from dashboard_client import DashboardClient
 from rtde_control import RTDEControlInterface
@@ -17,12 +16,10 @@ from rtde_io import RTDEIOInterface
 from rtde_receive import RTDEReceiveInterface
 
 from config.arm import ArmConfig
-from config.rig import Rig
-from config.scenario import Scenario
-from robot.errors import NotEngagedError, RobotConfigError, StaleStateError, WireError
+from robot.errors import NotEngagedError, StaleStateError, WireError
 from robot.geometry import quat_of_rotation_vector
-from robot.hal.protocols import Camera, Resetter, SceneTruth
 from robot.hal.robotiq import GripScale, RobotiqGripper
+from robot.hal.rtde_clock import RtdeClock
 from robot.hal.ur_checks import check_facts, check_pose
 from robot.hal.ur_primary import read_facts
 from robot.hal.ur_state import (
@@ -31,17 +28,15 @@ from robot.hal.ur_state import (
     UrStatus,
     check_ready,
     check_version,
-    kind_of_address,
     mode_of,
     parse_version,
     why_refused,
 )
-from robot.messages import ArmCommand, ArmSpec, ArmState, PlantIdentity, Vec6
+from robot.messages import ArmCommand, ArmSpec, ArmState, Vec6
 
-__all__ = ["RtdeArm", "RtdeClock", "RtdePlant"]
+__all__ = ["RtdeArm"]
 
 RATE_HZ = 500.0
-TICK_NS = 2_000_000
 STALE_NS = 50_000_000
 N_BITS = 16
 N_STANDARD = 8
@@ -53,36 +48,6 @@ PROOF_S = 0.5
 PAYLOAD_TOLERANCE_KG, TCP_TOLERANCE = 0.05, 1e-4
 STOP_RAD_S2, REST_S, STILL_RAD_S = 10.0, 1.0, 0.01
 START_S = 2.0
-
-
-class RtdeClock:
-    """Wall time on the client's own pacing. A tick that was missed is skipped and counted."""
-
-    def __init__(self) -> None:
-        self._pacer: RTDEReceiveInterface | None = None
-        self._start: Any = None
-        self._due_ns = 0
-
-    def pace_by(self, pacer: RTDEReceiveInterface | None) -> None:
-        """Take the client that waits; None ends waiting."""
-        self._pacer = pacer
-        if pacer is not None:
-            self._start, self._due_ns = pacer.initPeriod(), monotonic_ns() + TICK_NS
-
-    def now_ns(self) -> int:
-        """Return the host's monotonic time in nanoseconds."""
-        return monotonic_ns()
-
-    def wait_tick(self) -> int:
-        """Wait for the end of the period in hand and return how many whole periods were missed."""
-        if self._pacer is None:
-            raise StaleStateError("arm: expected connect() before waiting for its ticks")
-        self._pacer.waitPeriod(self._start)
-        self._start = self._pacer.initPeriod()
-        now_ns = monotonic_ns()
-        n_missed = max(0, (now_ns - self._due_ns) // TICK_NS)
-        self._due_ns = now_ns + TICK_NS
-        return int(n_missed)
 
 
 class RtdeArm:
@@ -154,11 +119,12 @@ class RtdeArm:
         self._prove_watchdog(control)
         self._control = control = self._take_control()
         self._set_up(control, receive)
-        self._require(control.setWatchdog(WATCHDOG_HZ), "setWatchdog")
         self._outputs = RTDEIOInterface(self.address)
         self._put_bits = receive.getActualDigitalOutputBits() & _ALL_BITS
         if not self._gripper.is_active:
             self._gripper.activate()
+        # From here on somebody must write: a command every 100 ms at least, or the program ends.
+        self._require(control.setWatchdog(WATCHDOG_HZ), "setWatchdog")
 
     # ------------------------------------------------------------------------------------------------ read and write
 
@@ -348,31 +314,6 @@ class RtdeArm:
             if max(abs(v) for v in state.qd_rad_s) < STILL_RAD_S:
                 return True
         return False
-
-
-class RtdePlant:
-    """A UR5e at an address: real, or a virtual controller on this machine's loopback."""
-
-    def __init__(self, *, arm: ArmConfig, scenario: Scenario, rig: Rig) -> None:
-        """Store. Nothing is acquired.
-
-        Raises:
-            RobotConfigError: the rig names no address, or its ticks are not the arm's.
-        """
-        if rig.address is None:
-            raise RobotConfigError(f"rig {rig.name}: expected an address for its arm, came none")
-        if round(rig.tick_s * 1e9) != TICK_NS:
-            raise RobotConfigError(f"rig {rig.name}: expected tick_s 0.002, as the arm's, came {rig.tick_s}")
-        self._kind, self._scenario = kind_of_address(rig.address), scenario
-        self.arm = RtdeArm(arm=arm, address=rig.address)
-        self.cameras: Mapping[str, Camera] = {}
-        self.truth: SceneTruth | None = None
-        self.resetter: Resetter
-
-    @property
-    def identity(self) -> PlantIdentity:
-        """What the controller says it is, from connect() on; before that its serial is empty."""
-        return PlantIdentity(kind=self._kind, model=self.arm.spec.model, serial=self.arm.serial)
 
 
 @contextmanager

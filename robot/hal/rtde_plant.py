@@ -1,0 +1,40 @@
+"""A UR5e as a plant: the arm at the rig's address."""
+
+from collections.abc import Mapping
+
+from config.arm import ArmConfig
+from config.rig import Rig
+from config.scenario import Scenario
+from robot.errors import RobotConfigError
+from robot.hal.protocols import Camera, Resetter, SceneTruth
+from robot.hal.rtde import RtdeArm
+from robot.hal.rtde_clock import TICK_NS
+from robot.hal.ur_state import kind_of_address
+from robot.messages import PlantIdentity
+
+__all__ = ["RtdePlant"]
+
+
+class RtdePlant:
+    """A UR5e at an address: real, or a virtual controller on this machine's loopback."""
+
+    def __init__(self, *, arm: ArmConfig, scenario: Scenario, rig: Rig) -> None:
+        """Store. Nothing is acquired.
+
+        Raises:
+            RobotConfigError: the rig names no address, or its ticks are not the arm's.
+        """
+        if rig.address is None:
+            raise RobotConfigError(f"rig {rig.name}: expected an address for its arm, came none")
+        if round(rig.tick_s * 1e9) != TICK_NS:
+            raise RobotConfigError(f"rig {rig.name}: expected tick_s 0.002, as the arm's, came {rig.tick_s}")
+        self._kind, self._scenario = kind_of_address(rig.address), scenario
+        self.arm = RtdeArm(arm=arm, address=rig.address)
+        self.cameras: Mapping[str, Camera] = {}
+        self.truth: SceneTruth | None = None
+        self.resetter: Resetter
+
+    @property
+    def identity(self) -> PlantIdentity:
+        """What the controller says it is, from connect() on; before that its serial is empty."""
+        return PlantIdentity(kind=self._kind, model=self.arm.spec.model, serial=self.arm.serial)
