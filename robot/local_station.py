@@ -1,4 +1,4 @@
-"""A station in one process: plant, perception, cell, reflexes, motion and gate, tick by tick in lock-step."""
+"""A station: perception and the hand's reflexes around a loop that holds the arm, and the arming of it all."""
 
 from types import TracebackType
 from typing import Protocol
@@ -7,14 +7,14 @@ import msgspec
 
 from config.arm import ArmConfig
 from config.rig import Rig
-from config.rules import RuleSet
 from config.scenario import Scenario
 from robot.errors import RobotConfigError
-from robot.hal.protocols import Plant
+from robot.hal.protocols import Resetter, SceneTruth
 from robot.messages import (
     ArmState,
     Executed,
     Grip,
+    GripCommand,
     Intent,
     Percept,
     PlantIdentity,
@@ -25,7 +25,7 @@ from robot.messages import (
 )
 from robot.motion import HandReflexes
 from robot.safety import Arming
-from robot.tick_loop import Stride, TickLoop
+from robot.tick_loop import Stride
 
 __all__ = ["LocalStation", "Perceives"]
 
@@ -41,31 +41,78 @@ class Perceives(Protocol):
         ...
 
 
-class LocalStation:
-    """Implements robot.station.Station over one plant in this process, and Armable for an operator.
+class World(Protocol):
+    """What the station needs of a plant, besides its arm."""
 
-    Each tick: read, cell, motion, gate, wait. The percept is made once, at the end of a step; the hand's reflexes are
-    decided once, at its beginning. After arming, a reset or a latch everything starts from the measured state, so that
+    @property
+    def identity(self) -> PlantIdentity:
+        """Which plant this is; known when its arm is connected."""
+        ...
+
+    @property
+    def truth(self) -> SceneTruth | None:
+        """Ground truth, where there is any."""
+        ...
+
+    @property
+    def resetter(self) -> Resetter:
+        """What lays the table out."""
+        ...
+
+
+class Loop(Protocol):
+    """What holds the arm, tick by tick: in this process or in another."""
+
+    @property
+    def is_in_contact(self) -> bool:
+        """Whether something holds the tool up."""
+        ...
+
+    def connect(self) -> None:
+        """Acquire the arm. Moves nothing."""
+        ...
+
+    def engage(self) -> None:
+        """Take command of the arm, unless it is ours already."""
+        ...
+
+    def begin_epoch(self, epoch: int) -> int:
+        """Take up an epoch's rules and return the outputs it begins with."""
+        ...
+
+    def seed(self) -> ArmState:
+        """Start everything from the measured state, and return it."""
+        ...
+
+    def stride(self, intent: Intent, grip: GripCommand, *, n_ticks: int, is_hand_busy: bool) -> Stride:
+        """Carry out an intent for so many ticks."""
+        ...
+
+    def close(self) -> None:
+        """Stop and release the arm. Idempotent, never raises."""
+        ...
+
+
+class LocalStation:
+    """Implements robot.station.Station over one loop, and Armable for an operator.
+
+    Each tick of the loop: read, cell, motion, gate, wait. The percept is made once, at the end of a step; the hand's
+    reflexes are decided once, at its beginning. After arming, a reset or a latch everything starts from the measured state, so that
     an epoch depends on nothing before its reset.
     """
 
     def __init__(
         self,
         *,
-        plant: Plant,
+        world: World,
+        loop: Loop,
         perception: Perceives,
         arm: ArmConfig,
         scenario: Scenario,
-        rule_sets: tuple[RuleSet, ...],
         rig: Rig,
     ) -> None:
-        if abs(plant.arm.spec.rate_hz * rig.tick_s - 1.0) > WHOLE_TICKS:
-            raise RobotConfigError(
-                f"rig {rig.name}: tick {rig.tick_s} s, the plant's is {1 / plant.arm.spec.rate_hz} s"
-            )
         table_m = scenario.table.height_m
-        self._plant, self._perception, self._rig = plant, perception, rig
-        self._loop = TickLoop(arm=plant.arm, config=arm, scenario=scenario, rule_sets=rule_sets, rig=rig)
+        self._world, self._loop, self._perception, self._rig = world, loop, perception, rig
         self._reflexes = HandReflexes(arm=arm, scenario=scenario)
         self._arming = Arming(expected=rig.expected, max_latches=rig.max_latches, latch_window=rig.latch_window)
         self._spec = StationSpec(
@@ -103,7 +150,7 @@ class LocalStation:
     @property
     def identity(self) -> PlantIdentity:
         """Which world this is."""
-        return self._plant.identity
+        return self._world.identity
 
     @property
     def n_latches(self) -> int:
@@ -113,28 +160,30 @@ class LocalStation:
     def connect(self) -> None:
         """Acquire the plant. Moves nothing. Idempotent."""
         if not self._is_connected:
-            self._plant.arm.connect()
+            self._loop.connect()
             self._is_connected = True
 
     def arm(self, *, by: str) -> None:
         """Go from disarmed to armed, if this is the plant that the rig names. For an operator."""
         self.connect()
-        self._arming.arm(identity=self._plant.identity, by=by)
+        self._arming.arm(identity=self._world.identity, by=by)
 
     def engage(self) -> None:
         """Go from armed to engaged: everything starts from the measured state. For an operator."""
+        self._arming.require_armed()
+        self._loop.engage()
         self._arming.engage()
         self._seed()
 
     def reset_plant(self, *, seed: int, epoch: int) -> None:
         """Lay the table out in any mode. Clears no latch. For an operator."""
         digital_out = self._loop.begin_epoch(epoch)
-        self._plant.resetter.reset(seed=seed, epoch=epoch, digital_out=digital_out)
+        self._world.resetter.reset(seed=seed, epoch=epoch, digital_out=digital_out)
         self._arming.note_plant_reset()
 
     def clear_latch(self, *, by: str) -> None:
         """Go from latched to armed, after the plant's reset only. For an operator."""
-        self._arming.clear_latch(identity=self._plant.identity, by=by)
+        self._arming.clear_latch(identity=self._world.identity, by=by)
 
     def reset(self, *, seed: int, epoch: int) -> Percept:
         """Lay the table out for an epoch and return the first percept.
@@ -144,6 +193,7 @@ class LocalStation:
         """
         self._arming.require_engaged()
         self.reset_plant(seed=seed, epoch=epoch)
+        self._loop.engage()  # a plant that stopped its arm for the reset took command away
         return self._seed()
 
     def step(self, intent: Intent, *, duration_s: float | None = None) -> StepResult:
@@ -165,8 +215,7 @@ class LocalStation:
     def close(self) -> None:
         """Stop and release. Idempotent, never raises."""
         if self._is_connected:
-            self._plant.arm.stop()
-            self._plant.arm.close()
+            self._loop.close()
             self._is_connected = False
         self._arming.disarm()
 
@@ -178,7 +227,7 @@ class LocalStation:
         return percept
 
     def _perceive(self, state: ArmState) -> Percept:
-        truth = self._plant.truth
+        truth = self._world.truth
         percept = self._perception.perceive(state, None if truth is None else truth.read())
         if self._loop.is_in_contact:
             percept = msgspec.structs.replace(percept, is_in_contact=True)

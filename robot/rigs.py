@@ -11,6 +11,7 @@ from robot.errors import RobotConfigError
 from robot.hal.protocols import Plant
 from robot.local_station import LocalStation
 from robot.safety import Operator
+from robot.tick_loop import TickLoop
 
 __all__ = ["build_operator", "build_plant", "build_station", "load"]
 
@@ -43,14 +44,10 @@ def build_station(resolved: Resolved, *, plant: Plant | None = None) -> LocalSta
         plant: One that is already made, in place of the rig's.
     """
     rig, arm, scenario = resolved.rig, resolved.arm, resolved.scenario
-    return LocalStation(
-        plant=build_plant(rig=rig, arm=arm, scenario=scenario) if plant is None else plant,
-        perception=load(rig.perception)(scenario=scenario, arm=arm),
-        arm=arm,
-        scenario=scenario,
-        rule_sets=resolved.rule_sets,
-        rig=rig,
-    )
+    world = build_plant(rig=rig, arm=arm, scenario=scenario) if plant is None else plant
+    loop = TickLoop(arm=world.arm, config=arm, scenario=scenario, rule_sets=resolved.rule_sets, rig=rig)
+    perception = load(rig.perception)(scenario=scenario, arm=arm)
+    return LocalStation(world=world, loop=loop, perception=perception, arm=arm, scenario=scenario, rig=rig)
 
 
 def build_operator(rig: Rig) -> Operator | None:

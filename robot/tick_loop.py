@@ -7,7 +7,7 @@ from config.rig import Rig
 from config.rules import RuleSet
 from config.scenario import Scenario
 from robot.cell import Cell
-from robot.errors import WireError
+from robot.errors import RobotConfigError, WireError
 from robot.hal.protocols import Arm
 from robot.kinematics import ToolChain
 from robot.messages import ArmCommand, ArmState, GripCommand, Hold, Intent, Vec3, Verdict
@@ -16,6 +16,7 @@ from robot.safety import Gate, GateLimits, Reason
 
 __all__ = ["Stride", "TickLoop"]
 
+WHOLE_TICKS = 1e-6
 _HOLD = Hold()
 
 
@@ -52,7 +53,12 @@ class TickLoop:
             scenario: the table.
             rule_sets: one for each span of the scenario's schedule.
             rig: how long a tick is.
+
+        Raises:
+            RobotConfigError: the arm's tick is another.
         """
+        if abs(arm.spec.rate_hz * rig.tick_s - 1.0) > WHOLE_TICKS:
+            raise RobotConfigError(f"rig {rig.name}: tick {rig.tick_s} s, the plant's is {1 / arm.spec.rate_hz} s")
         table_m = scenario.table.height_m
         self._arm = arm
         self._cell = Cell(scenario=scenario, rule_sets=rule_sets, arm=config)
@@ -61,11 +67,25 @@ class TickLoop:
         self._gate = Gate(arm=arm, limits=limits, chain=ToolChain(config))
         self._tick_s, self._tick_ns = rig.tick_s, round(rig.tick_s * 1e9)
         self.state: ArmState
+        self._before: ArmState
 
     @property
     def is_in_contact(self) -> bool:
         """Whether something holds the tool up."""
         return self._mover.is_in_contact
+
+    def connect(self) -> None:
+        """Acquire the arm. Moves nothing."""
+        self._arm.connect()
+
+    def engage(self) -> None:
+        """Take command of the arm, after somebody has armed it."""
+        self._arm.engage()
+
+    def close(self) -> None:
+        """Stop and release the arm. Idempotent, never raises."""
+        self._arm.stop()
+        self._arm.close()
 
     def begin_epoch(self, epoch: int) -> int:
         """Take up the rules of an epoch, latched inputs cleared, and return the outputs it begins with."""
@@ -87,21 +107,32 @@ class TickLoop:
             n_ticks: how long.
             is_hand_busy: the arm waits for the hand.
         """
-        before = self.state
+        verdict = self.begin(intent, n_ticks=n_ticks, is_hand_busy=is_hand_busy)
+        if verdict is not None:
+            return self.report(verdict, is_begun=False)
+        for _ in range(n_ticks):
+            verdict = self.tick(grip)
+            if verdict is not None:
+                break
+        return self.report(verdict, is_begun=True)
+
+    def begin(self, intent: Intent, *, n_ticks: int, is_hand_busy: bool) -> Verdict | None:
+        """Begin to carry out an intent; ticks do the rest. Returns the gate's refusal, if it refused."""
+        before = self._before = self.state
         verdict = self._gate.admit(intent, now_ns=self._arm.clock.now_ns())
         if verdict is not None:
-            return self._tell(before, verdict, is_begun=False)
+            return verdict
         duration_s = n_ticks * self._tick_s
         if is_hand_busy:
             self._mover.begin_step(_HOLD, before, duration_s=duration_s)
             self._mover.hold("hand")
         else:
             self._mover.begin_step(intent, before, duration_s=duration_s)
-        for _ in range(n_ticks):
-            verdict = self.tick(grip)
-            if verdict is not None:
-                break
-        return self._tell(before, verdict, is_begun=True)
+        return None
+
+    def rest(self) -> None:
+        """Come to rest and stay there: what ticks do between intents."""
+        self._mover.hold("no_intent")
 
     def tick(self, grip: GripCommand) -> Verdict | None:
         """Run one tick and return the gate's refusal, if it refused."""
@@ -130,9 +161,10 @@ class TickLoop:
             self.state = self._arm.read()
         return self.state
 
-    def _tell(self, before: ArmState, verdict: Verdict | None, *, is_begun: bool) -> Stride:
+    def report(self, verdict: Verdict | None, *, is_begun: bool) -> Stride:
+        """Return what the time step that was begun last came to."""
         mover = self._mover
         return Stride(
-            before=before, after=self.state, is_begun=is_begun, target_m=mover.target_m, limiters=mover.limiters,
+            before=self._before, after=self.state, is_begun=is_begun, target_m=mover.target_m, limiters=mover.limiters,
             is_in_contact=mover.is_in_contact, verdict=verdict,
         )  # fmt: skip

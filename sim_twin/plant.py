@@ -161,6 +161,9 @@ class TwinArm:
         """Take the arm; nothing moves."""
         self._is_connected = True
 
+    def engage(self) -> None:
+        """Take command; there is nobody to take it from."""
+
     def read(self) -> ArmState:
         """Return the state after the last tick."""
         if not self._is_connected:

@@ -49,6 +49,7 @@ class FakeArm:
         mode: What the arm says of itself.
         is_silent: No state comes any more.
         n_stops: How often it was stopped.
+        n_engaged: How often command was taken.
         n_commands: How many commands it was sent.
     """
 
@@ -76,6 +77,7 @@ class FakeArm:
         self.mode = ArmMode.RUNNING
         self.is_silent = False
         self.n_stops = 0
+        self.n_engaged = 0
         self.n_commands = 0
         self.put(arm.home_rad, digital_out=0)
 
@@ -92,6 +94,10 @@ class FakeArm:
     def connect(self) -> None:
         """Acquire the arm; nothing moves."""
         self._is_connected = True
+
+    def engage(self) -> None:
+        """Take command."""
+        self.n_engaged += 1
 
     def read(self) -> ArmState:
         """Return the state after the last tick."""

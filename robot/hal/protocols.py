@@ -60,6 +60,14 @@ class Arm(Protocol):
         """Acquire the arm. Never moves arm or fingers, never stops a program."""
         ...
 
+    def engage(self) -> None:
+        """Take command, after somebody has armed: from here on `write` moves. The arm itself moves not yet.
+
+        Raises SafetyError where the arm is not ready or is somebody else's. Needed again after every stop; else it
+        changes nothing.
+        """
+        ...
+
     def read(self) -> ArmState:
         """Return the newest state. Raises StaleStateError past its deadline."""
         ...

@@ -107,13 +107,14 @@ class RtdeArm:
         self._wait_first_state()
 
     def engage(self) -> None:
-        """Take command of the arm. From here on `write` moves it; nothing moves yet but a hand that needs activating.
+        """Take command of the arm, unless it is ours already. Nothing moves yet but a hand that needs activating.
 
         Raises:
             ArmRefusedError: the arm is not ready, or belongs to somebody else, or its watchdog does not work.
         """
+        if self._control is not None:
+            return
         receive, dashboard = self._reading()
-        self._drop_control()
         check_ready(self.status(), is_remote=_is_remote(dashboard))
         control = self._take_control()
         self._prove_watchdog(control)

@@ -95,9 +95,13 @@ class Arming:
         self._check_person(identity, by)
         self._mode = StationMode.ARMED
 
+    def require_armed(self) -> None:
+        """Raise SafetyError unless armed."""
+        self._require(StationMode.ARMED, "engage")
+
     def engage(self) -> None:
         """Go from armed to engaged."""
-        self._require(StationMode.ARMED, "engage")
+        self.require_armed()
         self._mode = StationMode.ENGAGED
 
     def disarm(self) -> None:

@@ -1,0 +1,104 @@
+"""What crosses the pipe between a station and its servo process."""
+
+import msgspec
+
+from robot.messages import ArmState, GripCommand, Intent, PlantIdentity
+from robot.tick_loop import Stride
+
+__all__ = [
+    "BeginEpoch",
+    "Close",
+    "Connect",
+    "Connected",
+    "Done",
+    "Engage",
+    "Failure",
+    "Outputs",
+    "Reply",
+    "Request",
+    "Seed",
+    "Seeded",
+    "Stop",
+    "StrideReply",
+    "StrideRequest",
+]
+
+
+class _Tagged(msgspec.Struct, frozen=True, kw_only=True, tag=True):
+    """Base: the name of the class tells what it is."""
+
+
+class Connect(_Tagged, frozen=True, kw_only=True):
+    """Acquire the arm; answered by Connected."""
+
+
+class Engage(_Tagged, frozen=True, kw_only=True):
+    """Take command; answered by Done."""
+
+
+class Seed(_Tagged, frozen=True, kw_only=True):
+    """Start from the measured state, and hold it from now on; answered by Seeded."""
+
+
+class BeginEpoch(_Tagged, frozen=True, kw_only=True):
+    """Take up an epoch's rules; answered by Outputs."""
+
+    epoch: int
+
+
+class StrideRequest(_Tagged, frozen=True, kw_only=True):
+    """Carry out an intent for so many ticks; answered by StrideReply when they are over."""
+
+    intent: Intent
+    grip: GripCommand
+    n_ticks: int
+    is_hand_busy: bool
+
+
+class Stop(_Tagged, frozen=True, kw_only=True):
+    """Stop the arm and give up command; answered by Done."""
+
+
+class Close(_Tagged, frozen=True, kw_only=True):
+    """Stop, release and end; answered by Done."""
+
+
+Request = Connect | Engage | Seed | BeginEpoch | StrideRequest | Stop | Close
+
+
+class Connected(_Tagged, frozen=True, kw_only=True):
+    """The arm is acquired."""
+
+    identity: PlantIdentity
+
+
+class Seeded(_Tagged, frozen=True, kw_only=True):
+    """What was measured."""
+
+    state: ArmState
+
+
+class Outputs(_Tagged, frozen=True, kw_only=True):
+    """Outputs that an epoch begins with."""
+
+    bits: int
+
+
+class StrideReply(_Tagged, frozen=True, kw_only=True):
+    """What the time step came to."""
+
+    stride: Stride
+
+
+class Done(_Tagged, frozen=True, kw_only=True):
+    """It is done."""
+
+
+class Failure(_Tagged, frozen=True, kw_only=True):
+    """It was not done: an error of the robot package, by its class's name."""
+
+    kind: str
+    message: str
+
+
+Reply = Connected | Seeded | Outputs | StrideReply | Done | Failure
