@@ -31,7 +31,7 @@ test-slow: setup
 	$(BIN)/pytest -m slow
 
 bench: setup
-	@for name in $(BENCHES); do $(BIN)/autotelic bench $$name || exit 1; done
+	@failed=0; for name in $(BENCHES); do $(BIN)/autotelic bench $$name || failed=1; done; exit $$failed
 
 clean:
 	rm -rf build dist *.egg-info .pytest_cache .ruff_cache .hypothesis .import_linter_cache

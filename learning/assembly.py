@@ -15,8 +15,7 @@ from learning.stopwatch import Stopwatch
 from learning.subgoal_selector import make_subgoal_selector
 from robot.messages import PlantIdentity, StationSpec
 from robot.operated import OperatedStation
-from robot.rigs import build_operator, build_plant, build_station
-from robot.timed import time_world
+from robot.rigs import build_operator, build_station
 
 __all__ = ["RobotLearner", "build_agent", "learner_maker"]
 
@@ -34,13 +33,11 @@ class RobotLearner:
         """
         # One small network at a time: more threads cost more than they bring, and the number would change the sums.
         torch.set_num_threads(1)
-        plant = build_plant(rig=resolved.rig, arm=resolved.arm, scenario=resolved.scenario)
-        if stopwatch is not None:
-            time_world(plant, stopwatch.lap)
-        self.identity: PlantIdentity = plant.identity
-        self.model_sha256: str | None = getattr(plant, "model_sha256", None)
-        self.station = OperatedStation(build_station(resolved, plant=plant), build_operator(resolved.rig))
+        station = build_station(resolved, heard_by=None if stopwatch is None else stopwatch.lap)
+        self.station = OperatedStation(station, build_operator(resolved.rig))
         self.station.connect()
+        self.identity: PlantIdentity = station.identity
+        self.model_sha256: str | None = station.model_sha256
         self.agent = build_agent(resolved, self.station.spec, seed=seed, stopwatch=stopwatch)
 
     def close(self) -> None:

@@ -67,26 +67,32 @@ class EvaluationRow(Row, frozen=True, kw_only=True):
     """Epoch whose rules were in force; at a change of rules both sides are looked at."""
     goal: int
     n_tests: int
-    """Test epochs that count; void ones do not."""
+    """Test epochs that were seen to the end."""
     n_successes: int
     n_void: int
+    """Test epochs cut short, by a latch or because what the hand held slipped away: further ones were run instead."""
     trials_achieved: int
     """Trials needed, summed over the successes."""
     trials_all: int
-    """Trials needed, summed over all tests; a failure counts as all trials of an epoch."""
+    """Trials needed, summed over the tests seen to the end; a failure counts as all trials of an epoch."""
     n_steps: int
     graph_cases: int | None
     """Reachable goal-states at which the learnt graph's prediction for this goal was compared with the rules."""
     graph_wrong: int | None
 
     @property
+    def n_all(self) -> int:
+        """Test epochs, those cut short among them."""
+        return self.n_tests + self.n_void
+
+    @property
     def success(self) -> float:
-        """Share of the tests that succeeded; 0 when none counts."""
-        return self.n_successes / self.n_tests if self.n_tests else 0.0
+        """Share of all test epochs that succeeded: one cut short failed. 0 where there was none."""
+        return self.n_successes / self.n_all if self.n_all else 0.0
 
     @property
     def trials_needed(self) -> float | None:
-        """Mean trials over all tests, failures counting as all trials."""
+        """Mean trials over the tests seen to the end, failures counting as all trials."""
         return self.trials_all / self.n_tests if self.n_tests else None
 
 

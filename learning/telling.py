@@ -63,7 +63,7 @@ def score_table(rows: Sequence[EvaluationRow], goals: Sequence[str]) -> Table:
     for row in rows:
         trials = f"{row.trials_achieved / row.n_successes:.2f}" if row.n_successes else "–"
         graph = "–" if row.graph_cases is None else f"{row.graph_wrong} of {row.graph_cases} states"
-        table.add_row(goals[row.goal], f"{row.n_successes} of {row.n_tests}", trials, graph)
+        table.add_row(goals[row.goal], f"{row.n_successes} of {row.n_all}", trials, graph)
     return table
 
 

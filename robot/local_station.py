@@ -97,8 +97,8 @@ class LocalStation:
     """Implements robot.station.Station over one loop, and Armable for an operator.
 
     Each tick of the loop: read, cell, motion, gate, wait. The percept is made once, at the end of a step; the hand's
-    reflexes are decided once, at its beginning. After arming, a reset or a latch everything starts from the measured state, so that
-    an epoch depends on nothing before its reset.
+    reflexes are decided once, at its beginning. After arming, a reset or a latch everything starts from the measured
+    state, so that an epoch depends on nothing before its reset.
     """
 
     def __init__(
@@ -151,6 +151,11 @@ class LocalStation:
     def identity(self) -> PlantIdentity:
         """Which world this is."""
         return self._world.identity
+
+    @property
+    def model_sha256(self) -> str | None:
+        """Digest of the world's model, where it is a simulated one in this process."""
+        return getattr(self._world, "model_sha256", None)
 
     @property
     def n_latches(self) -> int:

@@ -1,5 +1,6 @@
 """A rig becomes a station: the implementations that its file names are loaded and put together."""
 
+from collections.abc import Callable
 from importlib import import_module
 from typing import Any
 
@@ -12,6 +13,7 @@ from robot.hal.protocols import Plant
 from robot.local_station import LocalStation
 from robot.safety import Operator
 from robot.tick_loop import TickLoop
+from robot.timed import time_world
 
 __all__ = ["build_operator", "build_plant", "build_station", "load"]
 
@@ -36,17 +38,24 @@ def build_plant(*, rig: Rig, arm: ArmConfig, scenario: Scenario) -> Plant:
     return load(rig.plant)(arm=arm, scenario=scenario, rig=rig)
 
 
-def build_station(resolved: Resolved, *, plant: Plant | None = None) -> LocalStation:
+def build_station(
+    resolved: Resolved, *, plant: Plant | None = None, heard_by: Callable[[str], None] | None = None
+) -> LocalStation:
     """Return the station of a resolved config, disarmed and not yet connected.
 
     Args:
         resolved: Rig, arm, scenario and rule sets.
         plant: One that is already made, in place of the rig's.
+        heard_by: A stopwatch's lap that hears of every tick, where the arm is held in this process.
     """
     rig, arm, scenario = resolved.rig, resolved.arm, resolved.scenario
-    world = build_plant(rig=rig, arm=arm, scenario=scenario) if plant is None else plant
-    loop = TickLoop(arm=world.arm, config=arm, scenario=scenario, rule_sets=resolved.rule_sets, rig=rig)
     perception = load(rig.perception)(scenario=scenario, arm=arm)
+    if rig.bus is not None and plant is None:
+        return load("robot.lab:build_lab_station")(resolved, perception)  # brings the bus, which lock-step never needs
+    world = build_plant(rig=rig, arm=arm, scenario=scenario) if plant is None else plant
+    if heard_by is not None:
+        time_world(world, heard_by)
+    loop = TickLoop(arm=world.arm, config=arm, scenario=scenario, rule_sets=resolved.rule_sets, rig=rig)
     return LocalStation(world=world, loop=loop, perception=perception, arm=arm, scenario=scenario, rig=rig)
 
 

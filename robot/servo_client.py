@@ -2,6 +2,7 @@
 
 import os
 import signal
+from collections.abc import Callable
 from multiprocessing import get_context
 from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
@@ -54,8 +55,14 @@ class ServoClient:
         identity: Which plant the process found; None before connect().
     """
 
-    def __init__(self, resolved: Resolved) -> None:
-        """Store. The process starts with connect()."""
+    def __init__(self, resolved: Resolved, *, when_closed: Callable[[], object] | None = None) -> None:
+        """Store. The process starts with connect().
+
+        Args:
+            resolved: everything the rig is made of.
+            when_closed: called once when the client is closed.
+        """
+        self._when_closed = when_closed
         self._resolved_json = msgspec.json.encode(resolved)
         self._tick_s = resolved.rig.tick_s
         self._process: BaseProcess | None = None
@@ -116,6 +123,9 @@ class ServoClient:
 
     def close(self) -> None:
         """Stop, release and end the process. Idempotent, never raises."""
+        when_closed, self._when_closed = self._when_closed, None
+        if when_closed is not None:
+            when_closed()
         if self._process is None:
             return
         try:

@@ -1,0 +1,52 @@
+"""A station whose arm is held by a servo process and whose table is laid out by somebody else on the bus."""
+
+from config.resolved import Resolved
+from robot.bus import open_session
+from robot.bus.twin_link import RemoteResetter, RemoteTruth
+from robot.errors import NotEngagedError, RobotConfigError
+from robot.hal.protocols import Resetter, SceneTruth
+from robot.local_station import LocalStation, Perceives
+from robot.messages import PlantIdentity
+from robot.servo_client import ServoClient
+
+__all__ = ["build_lab_station"]
+
+
+class _LabWorld:
+    """The plant as the bus and the servo process know it (robot.local_station.World)."""
+
+    def __init__(self, *, loop: ServoClient, truth: SceneTruth, resetter: Resetter) -> None:
+        self._loop = loop
+        self.truth: SceneTruth | None = truth
+        self.resetter = resetter
+
+    @property
+    def identity(self) -> PlantIdentity:
+        """Which plant the servo process found."""
+        if self._loop.identity is None:
+            raise NotEngagedError("servo process: expected connect() before its plant's identity is asked for")
+        return self._loop.identity
+
+
+def build_lab_station(resolved: Resolved, perception: Perceives) -> LocalStation:
+    """Return the station of a rig with a bus, disarmed; the bus is open, the arm not connected to.
+
+    Args:
+        resolved: rig, arm, scenario and rule sets.
+        perception: what makes percepts.
+
+    Raises:
+        RobotConfigError: the rig names no bus.
+        BusError: nobody listens at its endpoint.
+    """
+    rig = resolved.rig
+    if rig.bus is None:
+        raise RobotConfigError(f"rig {rig.name}: expected the endpoint of its bus, came none")
+    session = open_session(rig.bus, is_hub=False)
+    loop = ServoClient(resolved, when_closed=session.close)
+    truth = RemoteTruth(session, rig.expected.serial)
+    resetter = RemoteResetter(session, rig.expected.serial, loop=loop, truth=truth)
+    world = _LabWorld(loop=loop, truth=truth, resetter=resetter)
+    return LocalStation(
+        world=world, loop=loop, perception=perception, arm=resolved.arm, scenario=resolved.scenario, rig=rig
+    )
