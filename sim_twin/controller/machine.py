@@ -2,13 +2,11 @@
 
 from collections import deque
 
-import numpy as np
-from numpy.typing import NDArray
-
 from sim_twin.controller.io import InputsOutputs
 from sim_twin.controller.journal import Journal
 from sim_twin.controller.modes import Modes
 from sim_twin.controller.motion import SLICE_S, TwinDrive
+from sim_twin.controller.motion.poses import Array
 from sim_twin.controller.registers import Registers
 from sim_twin.controller.states import Event
 from sim_twin.controller.watchdogs import Watchdogs
@@ -17,7 +15,6 @@ from sim_twin.plant import TwinWorld
 
 __all__ = ["Machine"]
 
-Array = NDArray[np.float64]
 GRAVITY_M_S2 = 9.81
 N_STEADY = 50
 _SLICE_US = round(SLICE_S * 1e6)

@@ -1,26 +1,47 @@
 """RTDE's outputs by name: what each field is read from. What the twin does not have is a quiet robot's constant."""
 
+import math
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sim_twin.controller.builtins.state import JOINT_C
 from sim_twin.controller.machine import Machine
 from sim_twin.controller.motion import DhRow
+from sim_twin.controller.motion.poses import Array
 from sim_twin.controller.program import Programs
 from sim_twin.controller.states import RobotMode
 from sim_twin.controller.wire import Outputs, Value
 
 __all__ = ["BUS_V", "JOINT_V", "TargetTool", "elbow", "joint_mode", "make_outputs"]
 
-Array = NDArray[np.float64]
 Getters = dict[str, Callable[[], Value]]
 BUS_V, JOINT_V = 48.0, 48.0
 JOINT_RUNNING, JOINT_IDLE, JOINT_POWER_OFF = 253, 255, 239
 _BYTE = 0xFF
 _STEP_S = 1e-6
 _NO_VECTOR = (0.0,) * 6
+_NOT_THERE = (
+    "actual_momentum",
+    "io_current",
+    "euromap67_24V_voltage",
+    "euromap67_24V_current",
+    "tool_output_current",
+    "actual_robot_energy_consumed",
+    "actual_robot_braking_energy_dissipated",
+    "joint_position_deviation_ratio",
+    "collision_detection_ratio",
+)
+_NOT_COUNTED = (
+    "euromap67_input_bits",
+    "euromap67_output_bits",
+    "tool_analog_input_types",
+    "encoder0_raw",
+    "encoder1_raw",
+    "tool_output_mode",
+    "tool_digital_output0_mode",
+    "tool_digital_output1_mode",
+)
 
 
 class TargetTool:
@@ -61,15 +82,17 @@ def joint_mode(machine: Machine) -> int:
     return JOINT_IDLE if robot in (RobotMode.IDLE, RobotMode.POWER_ON, RobotMode.BACKDRIVE) else JOINT_POWER_OFF
 
 
-def elbow(rows: tuple[DhRow, ...], q_rad: Array) -> Array:
+def elbow(rows: tuple[DhRow, ...], q_rad: Array) -> tuple[float, float, float]:
     """Return where the elbow is, base axes (m): the end of the table's second row.  (6,) -> (3,)"""
-    p, R = np.zeros(3), np.eye(3)
-    for row, q in zip(rows[:2], q_rad, strict=False):
-        angle, alpha = q + row.theta_rad, row.alpha_rad
-        c, s, ca, sa = np.cos(angle), np.sin(angle), np.cos(alpha), np.sin(alpha)
-        p = p + R @ (row.a_m * c, row.a_m * s, row.d_m)
-        R = R @ np.array([[c, -s * ca, s * sa], [s, c * ca, -c * sa], [0.0, sa, ca]])
-    return p
+    base, shoulder = rows[0], rows[1]
+    q_1, q_2 = q_rad[0].item() + base.theta_rad, q_rad[1].item() + shoulder.theta_rad
+    c, s, ca, sa = math.cos(q_1), math.sin(q_1), math.cos(base.alpha_rad), math.sin(base.alpha_rad)
+    u, v, w = shoulder.a_m * math.cos(q_2), shoulder.a_m * math.sin(q_2), shoulder.d_m
+    return (
+        base.a_m * c + c * u - s * ca * v + s * sa * w,
+        base.a_m * s + s * u + c * ca * v - c * sa * w,
+        base.d_m + sa * v + ca * w,
+    )
 
 
 def _asked(machine: Machine) -> Getters:
@@ -92,7 +115,8 @@ def _measured(machine: Machine) -> Getters:
 
     def elbow_velocity() -> list[float]:
         q, qd = drive.measured.q_rad, drive.measured.qd_rad_s
-        return ((elbow(rows, q + qd * _STEP_S) - elbow(rows, q)) / _STEP_S).tolist()
+        after, before = elbow(rows, q + qd * _STEP_S), elbow(rows, q)
+        return [(b - a) / _STEP_S for a, b in zip(before, after, strict=True)]
 
     return {
         "actual_q": lambda: drive.measured.q_rad.tolist(),
@@ -103,7 +127,7 @@ def _measured(machine: Machine) -> Getters:
         "actual_TCP_speed": lambda: drive.measured.tcp_speed.tolist(),
         "actual_tool_accelerometer": machine.tool_acceleration,
         "actual_robot_current": lambda: float(np.abs(drive.measured.current_a).sum()),
-        "elbow_position": lambda: elbow(rows, drive.measured.q_rad).tolist(),
+        "elbow_position": lambda: elbow(rows, drive.measured.q_rad),
         "elbow_velocity": elbow_velocity,
     }
 
@@ -191,15 +215,5 @@ def _constants() -> Getters:
         "actual_robot_voltage": BUS_V,
         "tool_temperature": JOINT_C,
     }
-    values |= dict.fromkeys(
-        """actual_momentum io_current euromap67_24V_voltage euromap67_24V_current tool_output_current
-        actual_robot_energy_consumed actual_robot_braking_energy_dissipated joint_position_deviation_ratio
-        collision_detection_ratio""".split(),
-        0.0,
-    )
-    values |= dict.fromkeys(
-        """euromap67_input_bits euromap67_output_bits tool_analog_input_types encoder0_raw encoder1_raw
-        tool_output_mode tool_digital_output0_mode tool_digital_output1_mode""".split(),
-        0,
-    )
+    values |= dict.fromkeys(_NOT_THERE, 0.0) | dict.fromkeys(_NOT_COUNTED, 0)
     return {name: lambda value=value: value for name, value in values.items()}

@@ -1,10 +1,9 @@
 """The robot as the dashboard and the state ports see it."""
 
-import numpy as np
-
 from sim_twin.controller.builtins.state import CONTROLLER_C, JOINT_C
 from sim_twin.controller.machine import Machine
 from sim_twin.controller.modes import Modes
+from sim_twin.controller.motion.poses import Array
 from sim_twin.controller.outputs import TargetTool, elbow, joint_mode
 from sim_twin.controller.program import UNNAMED, Programs
 from sim_twin.controller.script.builtins import Popup
@@ -34,6 +33,7 @@ _STATES = {
     RuntimeState.PAUSED: "PAUSED",
 }
 _ESTOPS = (SafetyMode.SYSTEM_EMERGENCY_STOP, SafetyMode.ROBOT_EMERGENCY_STOP)
+_JOINTS_C: Vec6 = (JOINT_C, JOINT_C, JOINT_C, JOINT_C, JOINT_C, JOINT_C)
 _CHECKSUM = (0x1, 0x2, 0x3, 0x4, 0x5, 0x6)
 
 
@@ -187,8 +187,8 @@ class Panel:
                 q_target_rad=_six(machine.drive.motions.setpoint.q_target),
                 qd_rad_s=_six(measured.qd_rad_s),
                 current_a=_six(measured.current_a),
-                motor_temperature_c=(JOINT_C,) * 6,
-                mode=(mode,) * 6,
+                motor_temperature_c=_JOINTS_C,
+                mode=(mode, mode, mode, mode, mode, mode),
             ),
             tool=ToolData(output_voltage_v=io.tool_voltage_v, temperature_c=JOINT_C, mode=mode),
             masterboard=MasterboardData(
@@ -212,8 +212,7 @@ class Panel:
         drive, modes, io = machine.drive, machine.modes, machine.io
         measured, setpoint = drive.measured, drive.motions.setpoint
         pose, speed = self._target.read()
-        x, y, z = elbow(drive.kinematics.rows, measured.q_rad).tolist()
-        cog = drive.payload[1]
+        cog, mode = drive.payload[1], joint_mode(machine)
         return RealtimeState(
             time_s=machine.time_s,
             q_target_rad=_six(setpoint.q_target),
@@ -231,16 +230,16 @@ class Panel:
             tcp_pose_target=_vec6(pose),
             tcp_speed_target=_vec6(speed),
             digital_inputs=io.digital_in,
-            motor_temperature_c=(JOINT_C,) * 6,
+            motor_temperature_c=_JOINTS_C,
             controller_timer_s=machine.execution_s,
             robot_mode=int(modes.robot),
-            joint_modes=(joint_mode(machine),) * 6,
+            joint_modes=(mode, mode, mode, mode, mode, mode),
             safety_mode=int(modes.safety),
             tool_acceleration_m_s2=machine.tool_acceleration(),
             speed_scaling=drive.core.pace.scale,
             digital_outputs=io.digital_out,
             program_state=int(modes.runtime),
-            elbow_position_m=(x, y, z),
+            elbow_position_m=elbow(drive.kinematics.rows, measured.q_rad),
             safety_status=int(modes.safety),
             payload_kg=drive.payload[0],
             payload_cog_m=(float(cog[0]), float(cog[1]), float(cog[2])),
@@ -289,5 +288,5 @@ def _vec6(values: list[float] | tuple[float, ...]) -> Vec6:
     return a, b, c, d, e, f
 
 
-def _six(array: np.ndarray) -> Vec6:
+def _six(array: Array) -> Vec6:
     return _vec6(array.tolist())

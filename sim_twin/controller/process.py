@@ -1,8 +1,10 @@
 """A controller in a process of its own, for tests and for whoever wants one beside a client."""
 
-import multiprocessing
 import socket
+from contextlib import suppress
+from multiprocessing import get_context
 from multiprocessing.connection import Connection
+from multiprocessing.context import SpawnProcess
 from types import TracebackType
 from typing import Self
 
@@ -54,7 +56,7 @@ class ControllerProcess:
 
     def __init__(self, setup: Setup | None = None) -> None:
         self.setup = setup or Setup()
-        self._process: multiprocessing.process.BaseProcess | None = None
+        self._process: SpawnProcess | None = None
         self._line: Connection | None = None
 
     @property
@@ -68,12 +70,12 @@ class ControllerProcess:
         Raises:
             ControllerProcessError: it did not start.
         """
-        context = multiprocessing.get_context("spawn")
+        context = get_context("spawn")
         self._line, theirs = context.Pipe()
-        self._process = context.Process(
+        self._process = process = context.Process(
             target=_serve, args=(msgspec.json.encode(self.setup), theirs), name="virtual controller", daemon=True
         )
-        self._process.start()
+        process.start()
         theirs.close()
         said = b"nothing in time"
         try:
@@ -107,10 +109,8 @@ class ControllerProcess:
     def close(self) -> None:
         """End it; a second call does nothing."""
         if self._line is not None:
-            try:
+            with suppress(OSError):
                 self._line.send_bytes(_END)
-            except OSError:
-                pass
             self._line.close()
             self._line = None
         if self._process is not None:

@@ -68,9 +68,7 @@ class VirtualRobot:
         compiler: Callable[[MakeBuiltins], Compiler] = InlineCompiler,
     ) -> None:
         self.machine = Machine(world, version=version or ControllerVersion())
-        self.programs = Programs(
-            self.machine, compiler(lambda sockets: program_builtins(self.machine, sockets))
-        )
+        self.programs = Programs(self.machine, compiler(lambda sockets: program_builtins(self.machine, sockets)))
         modes = self.machine.modes
         self.hand = Hand(world, is_powered=lambda: modes.robot not in (RobotMode.POWER_OFF, RobotMode.NO_CONTROLLER))
         self.outputs = make_outputs(self.machine, self.programs)
@@ -81,7 +79,7 @@ class VirtualRobot:
             modes.robot = RobotMode.RUNNING
             self.machine.drive.engage()
 
-    def submit_script(self, text: str, source: ScriptSource | None = None) -> None:  # noqa: ARG002 - every port's programs are equal
+    def submit_script(self, text: str, source: ScriptSource | None = None) -> None:
         """Take one complete program; wire.ScriptSink. In local control programs are refused."""
         if self.machine.modes.is_remote or source is None:
             self.programs.submit(text)

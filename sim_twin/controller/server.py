@@ -77,9 +77,7 @@ class ControllerServer:
         self.setup = setup
         version = parse_version(setup.version)
         world = make_world(scenario=setup.scenario, seed=setup.seed)
-        self.robot = robot = VirtualRobot(
-            world, version=version, is_powered=setup.is_powered, compiler=ThreadCompiler
-        )
+        self.robot = robot = VirtualRobot(world, version=version, is_powered=setup.is_powered, compiler=ThreadCompiler)
         self.wires = Wires(
             outputs=robot.outputs,
             inputs=robot.machine,

@@ -3,7 +3,7 @@
 import math
 from enum import Enum
 
-__all__ = ["Watchdogs", "WatchdogAction"]
+__all__ = ["WatchdogAction", "Watchdogs"]
 
 SLICES_PER_S = 500.0
 

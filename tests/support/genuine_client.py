@@ -8,7 +8,7 @@ import numpy as np
 from sim_twin.controller.process import ControllerProcess
 from sim_twin.controller.server import Setup
 
-__all__ = ["HOME", "Station", "make_station", "until"]
+__all__ = ["HOME", "Station", "make_station", "moved", "until"]
 
 HOME = np.array([2.8186, -1.7634, 2.014, -1.8213, -1.5708, -1.8938])
 
@@ -21,6 +21,11 @@ def until(is_true, timeout_s=3.0):
             return False
         time.sleep(0.005)
     return True
+
+
+def moved(pose, *way_m):
+    """Return a pose with its place moved in the base's axes."""
+    return pose + np.array([*way_m, 0, 0, 0])
 
 
 class Station:

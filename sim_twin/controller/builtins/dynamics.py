@@ -5,7 +5,7 @@ import numpy as np
 
 from sim_twin.controller.builtins.moving import as_list
 from sim_twin.controller.machine import Machine
-from sim_twin.controller.motion.poses import matrix_from_pose
+from sim_twin.controller.motion.poses import Array, matrix_from_pose
 from sim_twin.controller.script import Builtins, Value
 from sim_twin.controller.script.builtins import flag, numbers, pose
 
@@ -19,13 +19,13 @@ def dynamics_builtins(machine: Machine) -> Builtins:
     drive, kinematics = machine.drive, machine.drive.kinematics
     dynamics = _Dynamics(machine)
 
-    def joints(q: Value) -> np.ndarray:
+    def joints(q: Value) -> Array:
         return drive.measured.q_rad if q is None else np.array(numbers(q))
 
-    def speeds(qd: Value) -> np.ndarray:
+    def speeds(qd: Value) -> Array:
         return drive.measured.qd_rad_s if qd is None else np.array(numbers(qd))
 
-    def tool(tcp: Value) -> np.ndarray:
+    def tool(tcp: Value) -> Array:
         return drive.core.T_ft if tcp is None else matrix_from_pose(pose(tcp))
 
     def get_jacobian(q: Value = None, tcp: Value = None) -> Value:
@@ -38,8 +38,8 @@ def dynamics_builtins(machine: Machine) -> Builtins:
 
     def get_mass_matrix(q: Value = None, include_rotors_inertia: Value = False) -> Value:
         rotors = np.diag(machine.world.model.dof_armature[:6])
-        M = dynamics.mass_matrix(joints(q))
-        return as_list(M if flag(include_rotors_inertia) else M - rotors)
+        mass = dynamics.mass_matrix(joints(q))
+        return as_list(mass if flag(include_rotors_inertia) else mass - rotors)
 
     def get_coriolis_and_centrifugal_torques(q: Value = None, qd: Value = None) -> Value:
         return as_list(dynamics.coriolis_nm(joints(q), speeds(qd)))
@@ -57,16 +57,16 @@ class _Dynamics:
 
     def __init__(self, machine: Machine) -> None:
         self._world = machine.world
-        self._data: mujoco.MjData | None = None
+        self._data = mujoco.MjData(machine.world.model)
 
-    def mass_matrix(self, q_rad: np.ndarray) -> np.ndarray:
+    def mass_matrix(self, q_rad: Array) -> Array:
         """Return M of the six joints.  (6,) -> (6, 6)"""
         model, data = self._world.model, self._posed(q_rad)
-        M = np.zeros((model.nv, model.nv))
-        mujoco.mj_fullM(model, data, M)
-        return M[:6, :6]
+        mass = np.zeros((model.nv, model.nv))
+        mujoco.mj_fullM(model, data, mass)
+        return mass[:6, :6]
 
-    def coriolis_nm(self, q_rad: np.ndarray, qd_rad_s: np.ndarray) -> np.ndarray:
+    def coriolis_nm(self, q_rad: Array, qd_rad_s: Array) -> Array:
         """Return C(q, qd) qd.  (6,), (6,) -> (6,)"""
         model, data = self._world.model, self._posed(q_rad)
         found = []
@@ -78,11 +78,8 @@ class _Dynamics:
             found.append(torque[:6])
         return found[1] - found[0]
 
-    def _posed(self, q_rad: np.ndarray) -> mujoco.MjData:
-        model = self._world.model
-        if self._data is None:
-            self._data = mujoco.MjData(model)
-        data = self._data
+    def _posed(self, q_rad: Array) -> mujoco.MjData:
+        model, data = self._world.model, self._data
         data.qpos[:] = self._world.data.qpos
         data.qpos[:6] = q_rad
         data.qvel[:] = 0.0

@@ -15,7 +15,7 @@ def force_builtins(machine: Machine) -> Builtins:
     drive = machine.drive
     core = drive.core
 
-    def force_mode(task_frame: Value, selection_vector: Value, wrench: Value, type: Value, limits: Value) -> Value:  # noqa: A002 - UR's name
+    def force_mode(task_frame: Value, selection_vector: Value, wrench: Value, type: Value, limits: Value) -> Value:
         core.force_mode(
             ForceTask(
                 frame=tuple(pose(task_frame)),

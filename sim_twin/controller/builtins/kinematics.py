@@ -5,6 +5,7 @@ import numpy as np
 from sim_twin.controller.builtins.moving import as_list, as_pose
 from sim_twin.controller.machine import Machine
 from sim_twin.controller.motion import KinematicsError
+from sim_twin.controller.motion.poses import Array
 from sim_twin.controller.pose import Pose
 from sim_twin.controller.script import Builtins, Value
 from sim_twin.controller.script.builtins import number, numbers, pose
@@ -19,7 +20,7 @@ def kinematics_builtins(machine: Machine) -> Builtins:
     drive = machine.drive
     kinematics, core = drive.kinematics, drive.core
 
-    def tool(tcp: Value) -> np.ndarray:
+    def tool(tcp: Value) -> Array:
         return core.tcp_offset if tcp is None or tcp == _ACTIVE else np.array(pose(tcp))
 
     def get_forward_kin(q: Value = None, tcp: Value = None) -> Value:
@@ -33,7 +34,8 @@ def kinematics_builtins(machine: Machine) -> Builtins:
         maxOrientationError: Value = 1e-10,  # noqa: N803 - UR's name
         tcp: Value = _ACTIVE,
     ) -> Value:
-        number(maxPositionError), number(maxOrientationError)
+        number(maxPositionError)
+        number(maxOrientationError)
         near = drive.measured.q_rad if qnear is None else np.array(numbers(qnear))
         return as_list(kinematics.inverse(numbers(pose(x)), near, tool(tcp)))
 

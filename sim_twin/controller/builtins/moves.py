@@ -5,12 +5,15 @@ import numpy as np
 from sim_twin.controller.builtins.moving import in_slices
 from sim_twin.controller.machine import Machine
 from sim_twin.controller.motion import Motion
-from sim_twin.controller.motion.poses import pose_from_matrix
+from sim_twin.controller.motion.poses import Array, pose_from_matrix
 from sim_twin.controller.pose import Pose
 from sim_twin.controller.script import Builtins, Value
 from sim_twin.controller.script.builtins import integer, number, numbers
 
 __all__ = ["move_builtins"]
+
+OPTIMAL_M_S2 = 10.0
+"""optimovel at an acceleration of 1; UR's own follows the joints' torques."""
 
 
 def move_builtins(machine: Machine) -> Builtins:
@@ -40,13 +43,14 @@ def move_builtins(machine: Machine) -> Builtins:
     def movec(
         pose_via: Value, pose_to: Value, a: Value = 1.2, v: Value = 0.25, r: Value = 0, mode: Value = 0
     ) -> Motion:
-        via, to = to_pose(pose_via), to_pose(pose_to)
-        machine.waypoint = np.array(to)
+        via, _ = as_pose(pose_via)
+        to, machine.waypoint = as_pose(pose_to)
         return moves.movec(via, to, number(a), number(v), number(r), integer(mode))
 
-    def to_pose(target: Value) -> list[float]:
-        goal, is_pose = aim(target)
-        return goal if is_pose else pose_from_matrix(core.tool_at(np.array(goal))).tolist()
+    def as_pose(target: Value) -> tuple[Array, Array]:
+        goal = np.array(numbers(target))
+        pose = goal if type(target) is Pose else pose_from_matrix(core.tool_at(goal))
+        return pose, pose
 
     def servoc(pose: Value, a: Value = 1.2, v: Value = 0.25, r: Value = 0) -> Motion:
         goal, is_pose = aim(pose)
@@ -54,15 +58,22 @@ def move_builtins(machine: Machine) -> Builtins:
 
     def optimovej(q: Value, a: Value = 0.3, v: Value = 0.3, r: Value = 0) -> Motion:
         goal, is_pose = aim(q)
-        fastest, hardest = share(v) * v_max, share(a) * a_max
+        fastest, hardest = _share(v) * v_max, _share(a) * a_max
         return moves.movej(goal, hardest, fastest, 0.0, number(r), is_pose=is_pose)
 
     def optimovel(pose: Value, a: Value = 0.3, v: Value = 0.3, r: Value = 0) -> Motion:
         goal, is_pose = aim(pose)
-        fastest = share(v) * machine.drive.limits.tool_speed_m_s
-        return moves.movel(goal, share(a) * fastest / 0.3, fastest, 0.0, number(r), is_pose=is_pose)
+        fastest = _share(v) * machine.drive.limits.tool_speed_m_s
+        return moves.movel(goal, _share(a) * OPTIMAL_M_S2, fastest, 0.0, number(r), is_pose=is_pose)
 
     return {name: in_slices(move) for name, move in {
         "movej": movej, "movel": movel, "movep": movep, "movec": movec, "servoc": servoc,
         "optimovej": optimovej, "optimovel": optimovel,
     }.items()}  # fmt: skip
+
+
+def _share(value: Value) -> float:
+    share = number(value)
+    if not 0.0 < share <= 1.0:
+        raise ValueError(f"expected a share above 0 and up to 1, got {share:g}")
+    return share

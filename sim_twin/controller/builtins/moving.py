@@ -3,16 +3,12 @@
 from collections.abc import Callable, Generator
 from functools import wraps
 
-import numpy as np
-from numpy.typing import NDArray
-
 from sim_twin.controller.motion import Motion, MotionConflictError
+from sim_twin.controller.motion.poses import Array
 from sim_twin.controller.pose import Pose
 from sim_twin.controller.script import Builtin, ScriptRuntimeError, Value
 
 __all__ = ["as_list", "as_pose", "in_slices"]
-
-Array = NDArray[np.float64]
 
 
 def in_slices(begin: Callable[..., Motion]) -> Builtin:

@@ -64,8 +64,9 @@ def _analogue(machine: Machine) -> Builtins:
             raise ValueError(f"expected 0, 12 or 24 V, got {volts}")
         io.tool_voltage_v = volts
 
-    def set_analog_inputrange(port: Value, range: Value) -> Value:  # noqa: A002 - UR's name
-        _below(port, 4), _below(range, 5)
+    def set_analog_inputrange(port: Value, range: Value) -> Value:
+        _below(port, 4)
+        _below(range, 5)
 
     return {
         "get_analog_in": get_standard_analog_in,
