@@ -54,6 +54,7 @@ class Faults:
             "late": self.late_ticks,
             "log": self.log,
             "noise": self.noise,
+            "program": lambda: {"text": self._robot.programs.last_text},
             "program_stop": lambda: self._happen(Event.STOP),
             "protective_stop": lambda: self._happen(Event.PROTECTIVE_STOP),
             "push": self.push,

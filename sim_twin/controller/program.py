@@ -21,6 +21,7 @@ class Programs:
         main: The program that runs or is paused.
         shelf: Programs that can be loaded by path.
         loaded: Path of the loaded one.
+        last_text: What was submitted last.
     """
 
     def __init__(self, machine: Machine, compiler: Compiler) -> None:
@@ -29,6 +30,7 @@ class Programs:
         self.main: Compiled | None = None
         self.shelf: dict[str, str] = {}
         self.loaded: str | None = None
+        self.last_text = ""
         self._next: Compiled | None = None
         self._secondary: list[Compiled] = []
 
@@ -39,6 +41,7 @@ class Programs:
 
     def submit(self, text: str) -> None:
         """Take a program's text: a `def` replaces the one that runs, a `sec` runs beside it."""
+        self.last_text = text
         self._compiler.submit(text)
 
     def handle(self, event: Event, *, joint: int | None = None) -> Reaction:

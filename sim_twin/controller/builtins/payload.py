@@ -3,7 +3,8 @@
 from sim_twin.controller.builtins.moving import as_list, as_pose
 from sim_twin.controller.machine import Machine
 from sim_twin.controller.script import Builtins, Value
-from sim_twin.controller.script.builtins import number, numbers, pose
+from sim_twin.controller.script.builtins import number, numbers
+from sim_twin.controller.script.builtins import pose as as_given
 
 __all__ = ["payload_builtins"]
 
@@ -16,8 +17,8 @@ def payload_builtins(machine: Machine) -> Builtins:
 def _tool(machine: Machine) -> Builtins:
     core = machine.drive.core
 
-    def set_tcp(pose_: Value, tcp_name: Value = "") -> Value:  # noqa: ARG001 - a name for the pendant
-        core.set_tcp(pose(pose_))
+    def set_tcp(pose: Value, tcp_name: Value = "") -> Value:  # noqa: ARG001 - a name for the pendant
+        core.set_tcp(as_given(pose))
 
     def get_tcp_offset() -> Value:
         return as_pose(core.tcp_offset)
