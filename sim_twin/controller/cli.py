@@ -14,8 +14,9 @@ app = Typer(
 HostOption = Annotated[str, typer.Option("--host", help="Address to listen on; every robot needs its own.")]
 
 
-@app.command()
-def run(
+@app.callback(invoke_without_command=True)
+def controller(
+    context: typer.Context,
     *,
     host: HostOption = "127.0.0.2",
     allow_any: Annotated[bool, typer.Option("--allow-any", help="Listen on an address that others can reach.")] = False,
@@ -25,7 +26,9 @@ def run(
     powered: Annotated[bool, typer.Option("--powered/--unpowered", help="Begin with power on.")] = True,
     script: Annotated[Path | None, typer.Option("--script", help="URScript file to run at the start.")] = None,
 ) -> None:
-    """Run a controller until Ctrl-C."""
+    """Run a virtual UR controller until Ctrl-C; unmodified clients connect to it."""
+    if context.invoked_subcommand is not None:
+        return
     from sim_twin.controller.server import ControllerServer, Setup
 
     try:

@@ -61,6 +61,9 @@ class Machine:
         self.external_wrench = [0.0] * 6
         self.n_standing = 0
         self.execution_s = 0.0
+        self._acceleration_slice = self._target_slice = -1
+        self._acceleration = (0.0, 0.0, 0.0)
+        self._target: tuple[list[float], list[float]] = ([], [])
 
     @property
     def time_s(self) -> float:
@@ -87,8 +90,18 @@ class Machine:
 
     def tool_acceleration(self) -> tuple[float, float, float]:
         """Return what an accelerometer in the tool reads: gravity, turned into the flange's axes (m/s²)."""
-        x, y, z = (self.drive.kinematics.forward(self.drive.measured.q_rad)[:3, :3].T @ self.gravity).tolist()
-        return x, y, z
+        if self._acceleration_slice != self.drive.n_slices:
+            T_bf = self.drive.kinematics.forward(self.drive.measured.q_rad)
+            x, y, z = (T_bf[:3, :3].T @ self.gravity).tolist()
+            self._acceleration_slice, self._acceleration = self.drive.n_slices, (x, y, z)
+        return self._acceleration
+
+    def target_tool(self) -> tuple[list[float], list[float]]:
+        """Return UR pose and speed (v, w) of the tool that the set-point asks for; found once a slice."""
+        if self._target_slice != self.drive.n_slices:
+            pose, speed = self.drive.core.target_tool()
+            self._target_slice, self._target = self.drive.n_slices, (pose.tolist(), speed.tolist())
+        return self._target
 
     def begin_program(self) -> None:
         """Put back what holds for one program only."""

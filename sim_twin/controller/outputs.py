@@ -13,7 +13,7 @@ from sim_twin.controller.program import Programs
 from sim_twin.controller.states import RobotMode
 from sim_twin.controller.wire import Outputs, Value
 
-__all__ = ["BUS_V", "JOINT_V", "TargetTool", "elbow", "joint_mode", "make_outputs"]
+__all__ = ["BUS_V", "JOINT_V", "elbow", "joint_mode", "make_outputs"]
 
 Getters = dict[str, Callable[[], Value]]
 BUS_V, JOINT_V = 48.0, 48.0
@@ -42,22 +42,6 @@ _NOT_COUNTED = (
     "tool_digital_output0_mode",
     "tool_digital_output1_mode",
 )
-
-
-class TargetTool:
-    """Pose and speed of the tool that the set-point asks for, found once a slice."""
-
-    def __init__(self, machine: Machine) -> None:
-        self._drive = machine.drive
-        self._slice = -1
-        self._found: tuple[list[float], list[float]] = ([], [])
-
-    def read(self) -> tuple[list[float], list[float]]:
-        """Return UR pose and (v, w)."""
-        if self._slice != self._drive.n_slices:
-            pose, speed = self._drive.core.target_tool()
-            self._slice, self._found = self._drive.n_slices, (pose.tolist(), speed.tolist())
-        return self._found
 
 
 def make_outputs(machine: Machine, programs: Programs) -> Outputs:
@@ -96,15 +80,15 @@ def elbow(rows: tuple[DhRow, ...], q_rad: Array) -> tuple[float, float, float]:
 
 
 def _asked(machine: Machine) -> Getters:
-    setpoint, drive, tool = machine.drive.motions.setpoint, machine.drive, TargetTool(machine)
+    setpoint, drive = machine.drive.motions.setpoint, machine.drive
     return {
         "target_q": lambda: setpoint.q_target.tolist(),
         "target_qd": lambda: setpoint.qd_target.tolist(),
         "target_qdd": lambda: setpoint.qdd_target.tolist(),
         "target_current": lambda: drive.measured.current_a.tolist(),
         "target_moment": lambda: drive.measured.torque_nm.tolist(),
-        "target_TCP_pose": lambda: tool.read()[0],
-        "target_TCP_speed": lambda: tool.read()[1],
+        "target_TCP_pose": lambda: machine.target_tool()[0],
+        "target_TCP_speed": lambda: machine.target_tool()[1],
         "joint_control_output": lambda: drive.measured.current_a.tolist(),
     }
 

@@ -4,7 +4,7 @@ from sim_twin.controller.builtins.state import CONTROLLER_C, JOINT_C
 from sim_twin.controller.machine import Machine
 from sim_twin.controller.modes import Modes
 from sim_twin.controller.motion.poses import Array
-from sim_twin.controller.outputs import TargetTool, elbow, joint_mode
+from sim_twin.controller.outputs import elbow, joint_mode
 from sim_twin.controller.program import UNNAMED, Programs
 from sim_twin.controller.script.builtins import Popup
 from sim_twin.controller.states import Event, RobotMode, RuntimeState, SafetyMode
@@ -51,7 +51,6 @@ class Panel:
 
     def __init__(self, machine: Machine, programs: Programs) -> None:
         self._machine, self._programs = machine, programs
-        self._target = TargetTool(machine)
         self.operational_mode = "NONE"
         self.is_shut_down = False
 
@@ -211,7 +210,7 @@ class Panel:
         machine = self._machine
         drive, modes, io = machine.drive, machine.modes, machine.io
         measured, setpoint = drive.measured, drive.motions.setpoint
-        pose, speed = self._target.read()
+        pose, speed = machine.target_tool()
         cog, mode = drive.payload[1], joint_mode(machine)
         return RealtimeState(
             time_s=machine.time_s,
