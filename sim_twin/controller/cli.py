@@ -8,9 +8,7 @@ from typer import Typer
 
 __all__ = ["app"]
 
-app = Typer(
-    no_args_is_help=True, help="A virtual UR controller in front of the twin; unmodified clients connect to it."
-)
+app = Typer(help="A virtual UR controller in front of the twin; unmodified clients connect to it.")
 HostOption = Annotated[str, typer.Option("--host", help="Address to listen on; every robot needs its own.")]
 
 

@@ -30,6 +30,7 @@ class Hand:
         self._status = RESET
         self._strokes: list[float] = []
         self._n_still = 0
+        self._held = MOVING
         data = world.data
         self._fingers = [data.qpos[a : a + 1] for a in world.finger_addresses]
         dofs = [int(world.model.joint(f"finger_{side}").dofadr[0]) for side in ("left", "right")]
@@ -71,6 +72,7 @@ class Hand:
         """Let one slice pass: the activation goes on when a stroke has come to its end."""
         speed = abs(self._speeds[0].item() + self._speeds[1].item())
         self._n_still = self._n_still + 1 if speed < STILL_M_S else 0
+        self._held = self._holding()
         if self._status != ACTIVATING or self._n_still < N_SETTLED:
             return
         self._strokes = self._strokes[1:]
@@ -102,11 +104,16 @@ class Hand:
         force_n = weakest + (strongest - weakest) * force / SHUT
         world.model.actuator_forcerange[world.grip_control] = (-force_n, force_n)
 
-    def _object(self) -> int:
-        """Something between the fingers is what keeps them from where they are asked to be."""
+    def _holding(self) -> int:
+        """Return whether something keeps the fingers from where they are asked to be; a short stir loses nothing."""
         off_m = self.opening_m - self._world.opening_asked_m
-        is_held = self._n_still >= 1 and abs(off_m) > HELD_GAP_M
-        if is_held and self.opening_m > HELD_GAP_M:
-            return HELD_CLOSING if off_m > 0.0 else HELD_OPENING
-        is_there = abs(self._world.opening_goal_m - self._world.opening_asked_m) < THERE_M and self._n_still >= 1
-        return THERE if is_there or self._status != ACTIVE else MOVING
+        if self.opening_m <= HELD_GAP_M or abs(off_m) <= HELD_GAP_M:
+            return MOVING
+        found = HELD_CLOSING if off_m > 0.0 else HELD_OPENING
+        return found if self._n_still or self._held == found else MOVING
+
+    def _object(self) -> int:
+        if self._held != MOVING or self._status != ACTIVE:
+            return self._held or THERE
+        is_there = abs(self._world.opening_goal_m - self._world.opening_asked_m) < THERE_M and self._n_still
+        return THERE if is_there else MOVING

@@ -13,6 +13,7 @@ from sim_twin.controller.server import ControllerServer, Setup, parse_version
 from sim_twin.controller.states import Event, RobotMode, RuntimeState, SafetyMode
 from sim_twin.controller.watchdogs import WatchdogAction, Watchdogs
 from sim_twin.controller.wire import ControllerVersion, GripperRequest, Outcome, output_fields
+from sim_twin.names import on_table
 from tests.support.virtual_robot import make_robot, run
 
 STOPPED, PLAYING, PAUSED = RuntimeState.STOPPED, RuntimeState.PLAYING, RuntimeState.PAUSED
@@ -208,6 +209,29 @@ def test_the_fingers_go_where_they_are_asked(pos):
     assert abs(measured.pos - pos) <= 4
     assert measured.obj == 3
     assert measured.pre == pos
+
+
+def test_what_is_between_the_fingers_is_told():
+    robot = make_robot()
+    world = robot.machine.world
+    robot.hand.request(GripperRequest(act=1))
+    settle(robot)
+    robot.hand.request(GripperRequest(act=1, gto=1, pos=0, spe=255, force=0))
+    settle(robot)
+    address = int(world.model.joint(on_table(world.scenario.cylinders[0].name)).qposadr[0])
+    robot.hand.request(GripperRequest(act=1, gto=1, pos=255, spe=255, force=0))
+    seen = []
+    for _ in range(1000):
+        # Held up by hand until the fingers have it.
+        world.data.qpos[address : address + 3] = world.data.site("tcp").xpos
+        robot.step()
+        seen.append(robot.hand.measure().obj)
+    assert seen[:3] == [0, 0, 0]
+    assert seen[-1] == 2
+    assert 20 < robot.hand.measure().pos < 240
+    robot.hand.request(GripperRequest(act=1, gto=1, pos=0, spe=255, force=0))
+    settle(robot)
+    assert robot.hand.measure().obj == 3
 
 
 def test_a_protective_stop_does_not_touch_the_hand():
