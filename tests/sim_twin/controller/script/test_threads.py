@@ -399,3 +399,28 @@ class Lift:
 @pytest.mark.parametrize("builtin", [Lift().up, Lift(), partial(Lift().up, height=1)])
 def test_whatever_is_a_generator_when_called_may_take_time(builtin):
     assert schedule("note(lift())", lift=builtin) == [(3, 1)]
+
+
+def test_a_join_inside_a_critical_section_lets_the_joined_thread_end():
+    notes = schedule(
+        """
+        global go = True
+        thread t():
+            while go:
+                enter_critical
+                sync()
+                exit_critical
+            end
+            note("ended")
+        end
+        handle = run t()
+        sync()
+        enter_critical
+        go = False
+        join handle
+        note("joined")
+        sync()
+        exit_critical
+        """
+    )
+    assert [what for _, what in notes] == ["ended", "joined"] or [what for what, _ in notes] == ["ended", "joined"]
