@@ -4,7 +4,8 @@ A slice is one control period, 500 a second on a robot. In each, every live thre
 threads were started until it takes time, waits or ends. A critical section holds the other threads off, over slices
 too; when it opens, whoever was held off gets its turn in the same slice, before the section closes again: scripts
 that leave a section only to enter it anew, as those of UR's own drivers do, would starve the others otherwise. Those
-scripts also join a thread from within a section: while its holder joins, the section holds nobody off.
+scripts also join threads and read from sockets within a section, and count on the others going on meanwhile: a section
+holds nobody off while its holder waits for a thread or for something outside.
 """
 
 import enum
@@ -27,8 +28,11 @@ class Wait(enum.Enum):
 
     JOIN = 0
     GIVE_WAY = 1
+    OUTSIDE = 2
+    """For something outside, such as a socket: takes the rest of the slice too, but holds nobody off meanwhile."""
 
 
+_LETS_RUN = (Wait.JOIN, Wait.OUTSIDE)
 Steps: TypeAlias = Generator["Wait | None", None, T]
 
 
@@ -60,7 +64,7 @@ class Meter:
 class Thread:
     """One thread: its work as a generator, and its side of the meter while another runs."""
 
-    __slots__ = ("depth", "is_alive", "is_joining", "left", "line", "name", "work")
+    __slots__ = ("depth", "is_alive", "is_waiting", "left", "line", "name", "work")
 
     def __init__(self, name: str, work: Steps[object], budget: int) -> None:
         self.name = name
@@ -68,7 +72,7 @@ class Thread:
         self.left = budget
         self.line = self.depth = 0
         self.is_alive = True
-        self.is_joining = False
+        self.is_waiting = False
 
 
 class Scheduler:
@@ -166,8 +170,8 @@ class Scheduler:
                 continue
             self._held_off.discard(thread)
             wait = self._advance(thread)
-            thread.is_joining = wait is Wait.JOIN
-            if wait is not None:
+            thread.is_waiting = wait in _LETS_RUN
+            if wait is not None and wait is not Wait.OUTSIDE:
                 again.append(thread)
             is_any_ahead |= wait is not Wait.JOIN
             if self._main is not None and not self._main.is_alive:
@@ -175,9 +179,9 @@ class Scheduler:
         return again, is_any_ahead
 
     def _is_held_off(self, thread: Thread) -> bool:
-        """Return whether another holds the section; one that joins waits for the others and so lets them run."""
+        """Return whether another holds the section; one that waits lets them run."""
         holder = self._sections[-1] if self._sections else thread
-        return holder is not thread and not holder.is_joining
+        return holder is not thread and not holder.is_waiting
 
     def _advance(self, thread: Thread) -> Wait | None:
         meter = self._meter
@@ -190,13 +194,13 @@ class Scheduler:
             return None
         finally:
             thread.line, thread.left, thread.depth = meter.line, meter.left, meter.depth
-        if isinstance(wait, Wait):
+        if isinstance(wait, Wait) and wait is not Wait.OUTSIDE:
             return wait
         if not self._may_take_time:
             raise ScriptRuntimeError(
                 "a secondary program may not take physical time: no sync, sleep or motion in a sec"
             )
-        return None
+        return wait
 
     def _thread(self, handle: Value, word: str) -> Thread | None:
         if type(handle) is not int:

@@ -5,6 +5,7 @@ from functools import partial
 import pytest
 
 from sim_twin.controller.script import Status
+from sim_twin.controller.script.threads import Wait
 from tests.support.scripts import Log, ScriptRun, program
 
 COUNTER = """
@@ -423,4 +424,26 @@ def test_a_join_inside_a_critical_section_lets_the_joined_thread_end():
         exit_critical
         """
     )
-    assert [what for _, what in notes] == ["ended", "joined"] or [what for what, _ in notes] == ["ended", "joined"]
+    assert [what for _, what in notes] == ["ended", "joined"]
+
+
+def test_a_wait_for_something_outside_holds_nobody_off():
+    def read():
+        for _ in range(3):
+            yield Wait.OUTSIDE
+        return 7
+
+    body = """
+    thread t():
+        while True:
+            note("t")
+            sync()
+        end
+    end
+    run t()
+    enter_critical
+    got = read()
+    note(got)
+    exit_critical
+    """
+    assert schedule(body, read=read) == [(1, "t"), (2, "t"), (3, "t"), (4, 7)]
