@@ -24,6 +24,7 @@ from sim_twin.plant import TwinWorld
 
 __all__ = ["VirtualRobot", "make_world"]
 
+_PROTECTIVE_BIT, _VIOLATION_BIT = 1 << 2, 1 << 8
 _STARVED = {WatchdogAction.PAUSE: Event.PAUSE, WatchdogAction.STOP: Event.STOP}
 
 
@@ -119,6 +120,10 @@ class VirtualRobot:
 
     def _stop_for(self, breach: Breach) -> None:
         cause = breach.cause
+        is_stopped = self.machine.modes.safety_status_bits & (_VIOLATION_BIT if cause.is_violation else _PROTECTIVE_BIT)
+        if is_stopped:
+            # What presses goes on pressing: one blow is one stop.
+            return
         argument = cause.value[1] if breach.joint is None else breach.joint
         self.machine.journal.error(cause.code, argument, breach.text, is_violation=cause.is_violation)
         event = Event.VIOLATION if cause.is_violation else Event.PROTECTIVE_STOP

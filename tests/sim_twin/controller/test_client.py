@@ -142,12 +142,15 @@ def test_contact_on_the_way_down_is_detected(station):
     station.rest()
     height = station.pose[2]
     assert 0.0 < height < 0.03
-    assert control.moveL([*station.pose[:2], height + 0.04, *station.pose[3:]], 0.25, 1.0)
-    control.startContactDetection([0.0, 0, -1.0, 0, 0, 0])
-    control.speedL([0.0, 0, -0.05, 0, 0, 0], 0.5)
-    assert until(lambda: control.readContactDetection() > 0)
-    control.stopContactDetection()
-    control.speedStop(4.0)
+    assert control.moveL([*station.pose[:2], height + 0.02, *station.pose[3:]], 0.25, 1.0)
+    assert control.startContactDetection([0.0, 0, -1.0, 0, 0, 0])
+    assert control.moveL([*station.pose[:2], height - 0.02, *station.pose[3:]], 0.05, 0.5, True)
+    # No command meanwhile: the client's script loses its own answer to a contact in the slice after a command.
+    assert until(lambda: station.receive.getActualTCPSpeed()[2] < -0.02)
+    station.rest()
+    assert control.readContactDetection() > 0
+    assert control.stopContactDetection()
+    assert station.pose[2] == pytest.approx(height, abs=TOLERANCE)
 
 
 def test_outputs_and_the_speed_slider_come_from_the_io_interface(station):
@@ -270,6 +273,46 @@ def test_links_that_are_cut_are_noticed(station):
     assert station.truth()["n_slices"] > before + 5, "physics goes on"
     station.process.fault("freeze", on=False)
     assert until(lambda: receive.getTimestamp() > stamp + 0.1)
+
+
+def test_an_open_safeguard_pauses_a_move_that_then_goes_on(station):
+    goal = HOME + X * 0.5
+    assert station.control.moveJ(list(goal), 1.0, 4.0, True)
+    assert until(lambda: station.q[0] - HOME[0] > 0.1)
+    station.process.fault("safeguard_open")
+    assert until(lambda: station.receive.getRuntimeState() == 4)
+    between = station.rest()[0] - HOME[0]
+    assert 0.1 < between < 0.45
+    assert station.receive.getSafetyMode() == 5
+    station.process.fault("safeguard_close")
+    assert until(lambda: abs(station.q[0] - goal[0]) < TOLERANCE)
+    assert until(lambda: station.control.getAsyncOperationProgress() < 0)
+
+
+def test_a_program_that_is_stopped_from_outside_takes_no_command(station):
+    station.process.fault("program_stop")
+    assert until(lambda: not station.control.isProgramRunning())
+    assert not station.control.moveJ(list(HOME))
+
+
+def test_links_that_are_late_make_the_client_late(station):
+    station.process.fault("delay", ms=20.0)
+    begun = time.monotonic()
+    assert station.control.isSteady() in (True, False)
+    assert time.monotonic() - begun > 0.035, "the command and its answer, each 20 ms late"
+    station.process.fault("delay")
+
+
+def test_noise_is_in_the_readings_only(station):
+    station.process.fault("noise", rad=0.002)
+    read, true = [], []
+    for _ in range(20):
+        time.sleep(0.004)
+        read.append(station.q)
+        true.append(station.truth()["q_rad"])
+    station.process.fault("noise")
+    assert np.std(read, axis=0).min() > 5e-4
+    assert np.std(true, axis=0).max() < 5e-4
 
 
 def test_local_control_keeps_the_client_out():

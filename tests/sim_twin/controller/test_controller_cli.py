@@ -38,7 +38,7 @@ def test_a_controller_says_that_it_is_ready_and_ends_cleanly(tmp_path):
 
 
 def test_an_address_that_others_can_reach_is_refused():
-    result = CliRunner().invoke(app, ["--host", "0.0.0.0"])  # noqa: S104 - it is refused
+    result = CliRunner().invoke(app, ["--host", "0.0.0.0"])
     assert result.exit_code == 2
     assert "--allow-any" in result.output
 

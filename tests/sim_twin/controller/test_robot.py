@@ -39,7 +39,7 @@ def ended(robot, n=2000):
     return run(robot, n, lambda: state_of(robot) is STOPPED)
 
 
-# -------------------------------------------------------------------------------------------------------------- programs
+# ------------------------------------------------------------------------------------------------------------ programs
 
 
 def test_the_same_program_moves_the_same_way_twice():
@@ -96,7 +96,8 @@ def test_a_speed_ends_with_its_program():
 
 def test_two_threads_that_move_end_the_program():
     robot = started(
-        "def f():\n thread t():\n  speedj([0.1,0,0,0,0,0],1,1)\n end\n sync()\n run t()\n speedj([0,0.1,0,0,0,0],1,1)\nend\n"
+        "def f():\n thread t():\n  speedj([0.1,0,0,0,0,0],1,1)\n end\n sync()\n run t()\n"
+        " speedj([0,0.1,0,0,0,0],1,1)\nend\n"
     )
     ended(robot)
     assert any("another thread is already controlling the robot" in line for line in lines(robot))
@@ -144,6 +145,43 @@ def test_power_comes_up_through_the_dashboard():
     assert robot.panel.brake_release() is Outcome.DONE
     run(robot, 2000, lambda: robot.machine.modes.robot is RobotMode.RUNNING)
     assert robot.outputs["joint_mode"]() == (253,) * 6
+
+
+def test_an_emergency_stop_takes_the_power_and_is_recovered_from_by_hand():
+    robot = started("def f():\n q = get_actual_joint_positions()\n q[0] = q[0] + 1\n movej(q)\nend\n")
+    run(robot, 300)
+    robot.programs.handle(Event.ROBOT_ESTOP)
+    assert robot.outputs["safety_status_bits"]() >> 7 & 1
+    run(robot, 400)
+    assert (state_of(robot), robot.machine.modes.robot) == (STOPPED, RobotMode.POWER_OFF)
+    assert robot.panel.brake_release() is Outcome.FAILED
+    robot.programs.handle(Event.ROBOT_ESTOP_RELEASED)
+    assert robot.panel.brake_release() is Outcome.DONE
+    run(robot, 2000, lambda: robot.machine.modes.robot is RobotMode.RUNNING)
+    robot.submit_script(FOREVER)
+    run(robot, 3)
+    assert state_of(robot) is PLAYING
+
+
+def test_a_collision_pauses_the_program_and_names_its_code():
+    robot = started("def f():\n speedl([0, 0, -0.03, 0, 0, 0], 1, 20)\nend\n")
+    run(robot, 9000, lambda: robot.machine.modes.is_stopped_by_safety)
+    assert robot.machine.modes.safety is SafetyMode.PROTECTIVE_STOP
+    run(robot, 300)
+    assert state_of(robot) is PAUSED
+    assert sum(line.startswith("C15") for line in lines(robot)) == 1, "one blow, one stop"
+
+
+def test_a_target_that_is_no_number_moves_nothing():
+    robot = make_robot()
+    robot.machine.write("input_double_register_0", math.nan)
+    robot.submit_script(
+        "def f():\n q = get_actual_joint_positions()\n q[0] = read_input_float_register(0)\n servoj(q)\nend\n"
+    )
+    before = robot.machine.world.data.qpos[:6].copy()
+    run(robot, 300)
+    assert state_of(robot) is not PLAYING
+    assert robot.machine.world.data.qpos[:6] == pytest.approx(before, abs=1e-3)
 
 
 def test_local_control_refuses_programs():
