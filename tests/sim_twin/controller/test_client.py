@@ -108,7 +108,7 @@ def test_speeds_are_reached_and_stopped(station):
 
 def test_force_mode_presses_on_the_table(station):
     control, receive = station.control, station.receive
-    station.over_the_table(0.02)
+    station.over_the_table(0.018)
     control.zeroFtSensor()
     for _ in range(400):
         control.forceMode([0.0] * 6, [0, 0, 1, 0, 0, 0], [0, 0, -20.0, 0, 0, 0], 2, [0.1, 0.1, 0.1, 0.3, 0.3, 0.3])
