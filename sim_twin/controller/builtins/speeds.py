@@ -1,9 +1,9 @@
-"""servoj, speedj, speedl, stopj, stopl."""
+"""servoj, speedj, speedl, stopj, stopl, direct_torque."""
 
 from sim_twin.controller.builtins.moving import in_slices
 from sim_twin.controller.machine import Machine
 from sim_twin.controller.motion import SLICE_S, Motion
-from sim_twin.controller.script import Builtins, ScriptRuntimeError, Value
+from sim_twin.controller.script import Builtins, Value
 from sim_twin.controller.script.builtins import number, numbers
 
 __all__ = ["speed_builtins"]
@@ -30,8 +30,21 @@ def speed_builtins(machine: Machine) -> Builtins:
     def stopl(a: Value = 2.0, aRot: Value = "a") -> Motion:  # noqa: N803, ARG001 - as above
         return speeds.stopl(number(a))
 
-    def direct_torque(*_: Value, **__: Value) -> Value:
-        raise ScriptRuntimeError("this controller moves the arm by positions; torques are not taken")
+    def direct_torque(
+        torque: Value,
+        friction_comp: Value = True,  # noqa: ARG001 - the twin's joints have no friction to make up for
+        viscous_scale: Value = None,  # noqa: ARG001 - as above
+        coulomb_scale: Value = None,  # noqa: ARG001 - as above
+    ) -> Motion:
+        machine.drive.put_torque(numbers(torque))
+        yield
 
-    moving = {"servoj": servoj, "speedj": speedj, "speedl": speedl, "stopj": stopj, "stopl": stopl}
-    return {**{name: in_slices(begin) for name, begin in moving.items()}, "direct_torque": direct_torque}
+    moving = {
+        "servoj": servoj,
+        "speedj": speedj,
+        "speedl": speedl,
+        "stopj": stopj,
+        "stopl": stopl,
+        "direct_torque": direct_torque,
+    }
+    return {name: in_slices(begin) for name, begin in moving.items()}

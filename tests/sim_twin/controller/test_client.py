@@ -349,3 +349,9 @@ def test_other_versions_move_and_calculate(version):
             assert (np.linalg.eigvalsh(mass) > 0.0).all()
             jacobian = np.array(station.control.getJacobian()).reshape(6, 6)
             assert abs(np.linalg.det(jacobian)) > 1e-3
+        if version == "5.26.0":
+            before = station.q
+            assert station.control.directTorque([0.0] * 6, [0.0] * 6, [0.0] * 6)
+            time.sleep(0.2)
+            assert station.control.isProgramRunning()
+            assert station.q == pytest.approx(before, abs=TOLERANCE), "its weight is carried"

@@ -163,6 +163,24 @@ def test_an_emergency_stop_takes_the_power_and_is_recovered_from_by_hand():
     assert state_of(robot) is PLAYING
 
 
+def test_torques_move_a_joint_and_then_it_is_held():
+    robot = started(
+        "def f():\n i = 0\n while i < 100:\n  direct_torque([0, 0, 0, 0, 0, 0])\n  i = i + 1\n end\n"
+        " while i < 150:\n  direct_torque([8, 0, 0, 0, 0, 0])\n  i = i + 1\n end\nend\n"
+    )
+    q = robot.machine.world.data.qpos
+    start = q[:6].copy()
+    run(robot, 90)
+    assert q[:6] == pytest.approx(start, abs=1e-3), "its weight is carried"
+    ended(robot)
+    run(robot, 300)
+    held = q[:6].copy()
+    assert 0.01 < held[0] - start[0] < 0.3
+    run(robot, 100)
+    assert q[:6] == pytest.approx(held, abs=1e-4)
+    assert robot.machine.modes.safety is SafetyMode.NORMAL
+
+
 def test_a_collision_pauses_the_program_and_names_its_code():
     robot = started("def f():\n speedl([0, 0, -0.03, 0, 0, 0], 1, 20)\nend\n")
     run(robot, 9000, lambda: robot.machine.modes.is_stopped_by_safety)
