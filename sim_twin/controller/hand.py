@@ -64,7 +64,7 @@ class Hand:
             pre=self._request.pos,
             sta=self._status,
             obj=self._object(),
-            flt=0 if self._status != RESET else NOT_ACTIVATED,
+            flt=NOT_ACTIVATED if self._request.gto and not self._request.act else 0,
             is_powered=self._is_powered(),
         )
 

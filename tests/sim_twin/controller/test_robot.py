@@ -239,6 +239,15 @@ def settle(robot, n=3000):
     run(robot, n, lambda: robot.hand.measure().obj != 0 and robot.hand.measure().sta != 1)
 
 
+def test_a_hand_that_was_not_activated_stays_and_says_so():
+    robot = make_robot()
+    before = robot.hand.opening_m
+    robot.hand.request(GripperRequest(gto=1, pos=255))
+    run(robot, 100)
+    assert robot.hand.opening_m == pytest.approx(before, abs=1e-3)
+    assert robot.hand.measure().flt == 7
+
+
 def test_activation_strokes_open_and_shut():
     robot = make_robot()
     assert robot.hand.measure().sta == 0
