@@ -21,7 +21,7 @@ from sim_twin.controller.motion.limits import (
     default_limits,
 )
 from sim_twin.controller.motion.motions import Motions
-from sim_twin.controller.motion.poses import Array, pose_from_matrix
+from sim_twin.controller.motion.poses import Array, pose_from_matrix, vec6
 from sim_twin.controller.motion.setpoint import SLICE_S
 from sim_twin.controller.motion.wrench import NM_PER_A, ContactWrench, payload_bias
 from sim_twin.controller.states import MotionOrder
@@ -110,6 +110,8 @@ class TwinDrive:
         self.contact = ContactWatch()
         self._history: deque[Array] = deque(maxlen=N_HISTORY)
         self.n_slices = 0
+        self._torque_nm: Array | None = None
+        self._is_compliant = False
         self.lock()
         self.measured = self._read()
 
@@ -123,8 +125,7 @@ class TwinDrive:
     def lock(self) -> None:
         """Cut the servos' power and let the brakes in: a moving arm is stopped by its brakes (category 0)."""
         model = self.world.model
-        model.actuator_gainprm[self._controls] = 0.0
-        model.actuator_biasprm[self._controls] = 0.0
+        self._cut_servos()
         model.dof_frictionloss[:6] = BRAKE_NM
         model.dof_solimp[:6, :2] = BRAKE_SOLIMP
         self.is_braked = True
@@ -133,11 +134,32 @@ class TwinDrive:
     def engage(self) -> None:
         """Give the servos power where the joints are and release the brakes."""
         model = self.world.model
-        model.actuator_gainprm[self._controls] = self._gains
-        model.actuator_biasprm[self._controls] = self._biases
+        self._give_servos()
         model.dof_frictionloss[:6] = 0.0
         self.is_braked = False
         self._seat()
+
+    def put_torque(self, torque_nm: Sequence[float] | Array) -> None:
+        """Move the joints by torques in this slice, beside what carries their weight; afterwards they are held.  (6,)
+
+        Raises:
+            ValueError: they are not six finite numbers.
+        """
+        torque = vec6(torque_nm, "joint torques")
+        greatest = np.array([j.torque_nm for j in self.world.arm.joints])
+        self._torque_nm = np.clip(torque, -greatest, greatest)
+
+    def _cut_servos(self) -> None:
+        model = self.world.model
+        model.actuator_gainprm[self._controls] = 0.0
+        model.actuator_biasprm[self._controls] = 0.0
+        self._is_compliant = False
+
+    def _give_servos(self) -> None:
+        model = self.world.model
+        model.actuator_gainprm[self._controls] = self._gains
+        model.actuator_biasprm[self._controls] = self._biases
+        self._is_compliant = False
 
     def _seat(self) -> None:
         q = self.world.data.qpos[:6].copy()
@@ -180,16 +202,27 @@ class TwinDrive:
         Whatever passes a limit is not asked of the servos: the arm stops by itself (category 2) on a protective stop
         and is cut and braked (category 0) on a violation. The caller tells the modes and the program.
         """
-        breach = None if self.is_braked else self._drive()
         data = self.world.data
+        torque_nm, self._torque_nm = None if self.is_braked else self._torque_nm, None
+        if torque_nm is None and self._is_compliant:
+            self._give_servos()
+            self._seat()
+        breach = None if self.is_braked or torque_nm is not None else self._drive()
         if self.is_braked:
             data.ctrl[self._controls] = data.qpos[:6]
             if float(np.abs(data.qvel[:6]).max()) < HELD_RAD_S:
                 self.world.model.dof_frictionloss[:6] = HOLD_NM
             self.core.hold(data.qpos[:6].copy())
+        elif torque_nm is not None:
+            self._cut_servos()
+            self._is_compliant = True
+            data.qfrc_applied[:6] += torque_nm
         else:
             data.ctrl[self._controls] = self.motions.setpoint.q_target
         self.world.clock.wait_tick()
+        if torque_nm is not None:
+            data.qfrc_applied[:6] -= torque_nm
+            self._seat()
         self.n_slices += 1
         self.measured = self._read()
         self._history.append(self.measured.q_rad)

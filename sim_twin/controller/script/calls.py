@@ -8,7 +8,7 @@ from sim_twin.controller.script.code import Builtin, Code, Fast, Frame, Slow, ap
 from sim_twin.controller.script.context import Context, Routine, Scope, takes_time
 from sim_twin.controller.script.errors import ScriptRuntimeError
 from sim_twin.controller.script.syntax import Call, Definition, Expression, Run
-from sim_twin.controller.script.threads import Steps
+from sim_twin.controller.script.threads import Steps, Wait
 from sim_twin.controller.script.values import Value, copied
 
 __all__ = ["compile_call", "compile_run"]
@@ -189,7 +189,7 @@ def _call_of_builtin(
         meter.line = node.line
         return ScriptRuntimeError(f"{node.name}(): {error}")
 
-    def result_of(*values: Value) -> "Value | Generator[None, None, Value]":
+    def result_of(*values: Value) -> "Value | Generator[Wait | None, None, Value]":
         try:
             if names:
                 given = map(copied, values[n_positional:])
@@ -213,7 +213,7 @@ def _call_of_builtin(
 
 def _slow_builtin(
     operands: list[Code[Value]],
-    result_of: Callable[..., "Value | Generator[None, None, Value]"],
+    result_of: Callable[..., "Value | Generator[Wait | None, None, Value]"],
     failed: Callable[[Exception], ScriptRuntimeError],
 ) -> Code[Value]:
     def run(frame: Frame) -> Steps[Value]:

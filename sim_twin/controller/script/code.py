@@ -4,14 +4,14 @@ import enum
 from collections.abc import Callable, Generator, Mapping, Sequence
 from typing import Final, Generic, Literal, NamedTuple, TypeAlias, TypeVar
 
-from sim_twin.controller.script.threads import Steps
+from sim_twin.controller.script.threads import Steps, Wait
 from sim_twin.controller.script.values import Value
 
 __all__ = ["UNSET", "Builtin", "Builtins", "Code", "Fast", "Frame", "Signal", "Slow", "Unset", "applied"]
 
 T = TypeVar("T")
 
-Builtin: TypeAlias = Callable[..., "Value | Generator[None, None, Value]"]
+Builtin: TypeAlias = Callable[..., "Value | Generator[Wait | None, None, Value]"]
 Builtins: TypeAlias = Mapping[str, Builtin]
 
 

@@ -67,7 +67,8 @@ class _Parser(ExpressionParser):
             statements.append(self._statement())
             if self.kind == ";":
                 self.advance()
-            elif not self.token.is_first and self.kind not in _BLOCK_ENDS:
+            elif not (self.token.is_first or self.kind in _BLOCK_ENDS or self.kind in _STATEMENTS):
+                # A word that begins a statement may follow on the line: ur_rtde sends "0    global offset = ...".
                 self.fail("the end of the line after a statement")
         self.depth -= 1
         if self.kind == "end of text" and closed_by == "'end'":

@@ -3,7 +3,9 @@
 A slice is one control period, 500 a second on a robot. In each, every live thread runs in the order in which the
 threads were started until it takes time, waits or ends. A critical section holds the other threads off, over slices
 too; when it opens, whoever was held off gets its turn in the same slice, before the section closes again: scripts
-that leave a section only to enter it anew, as those of UR's own drivers do, would starve the others otherwise.
+that leave a section only to enter it anew, as those of UR's own drivers do, would starve the others otherwise. Those
+scripts also join threads and read from sockets within a section, and count on the others going on meanwhile: a section
+holds nobody off while its holder waits for a thread or for something outside.
 """
 
 import enum
@@ -26,8 +28,11 @@ class Wait(enum.Enum):
 
     JOIN = 0
     GIVE_WAY = 1
+    OUTSIDE = 2
+    """For something outside, such as a socket: takes the rest of the slice too, but holds nobody off meanwhile."""
 
 
+_LETS_RUN = (Wait.JOIN, Wait.OUTSIDE)
 Steps: TypeAlias = Generator["Wait | None", None, T]
 
 
@@ -59,7 +64,7 @@ class Meter:
 class Thread:
     """One thread: its work as a generator, and its side of the meter while another runs."""
 
-    __slots__ = ("depth", "is_alive", "left", "line", "name", "work")
+    __slots__ = ("depth", "is_alive", "is_waiting", "left", "line", "name", "work")
 
     def __init__(self, name: str, work: Steps[object], budget: int) -> None:
         self.name = name
@@ -67,6 +72,7 @@ class Thread:
         self.left = budget
         self.line = self.depth = 0
         self.is_alive = True
+        self.is_waiting = False
 
 
 class Scheduler:
@@ -84,8 +90,7 @@ class Scheduler:
         self._n_started = self._n_started_in_slice = 0
         self._turn: list[Thread] = []
         self._main: Thread | None = None
-        self._holder: Thread | None = None
-        self._n_entered = 0
+        self._sections: list[Thread] = []  # open ones, by who entered
         self._held_off: set[Thread] = set()
         self.running: Thread | None = None
 
@@ -132,15 +137,13 @@ class Scheduler:
 
     def enter(self) -> None:
         """Hold the other threads off; sections nest."""
-        self._holder = self.running
-        self._n_entered += 1
+        if self.running is not None:
+            self._sections.append(self.running)
 
     def leave(self) -> None:
         """Leave one section; without one there is nothing to leave."""
-        if self._holder is self.running and self._n_entered:
-            self._n_entered -= 1
-            if not self._n_entered:
-                self._holder = None
+        if self._sections and self._sections[-1] is self.running:
+            self._sections.pop()
 
     def step(self) -> None:
         """Run one slice, or as much of it as there is before the main thread ends."""
@@ -161,18 +164,24 @@ class Scheduler:
         for thread in turn:  # grows while threads are started
             if not thread.is_alive:
                 continue
-            if self._holder is not None and self._holder is not thread:
+            if self._is_held_off(thread):
                 self._held_off.add(thread)
                 again.append(thread)
                 continue
             self._held_off.discard(thread)
             wait = self._advance(thread)
-            if wait is not None:
+            thread.is_waiting = wait in _LETS_RUN
+            if wait is not None and wait is not Wait.OUTSIDE:
                 again.append(thread)
             is_any_ahead |= wait is not Wait.JOIN
             if self._main is not None and not self._main.is_alive:
                 return [], False
         return again, is_any_ahead
+
+    def _is_held_off(self, thread: Thread) -> bool:
+        """Return whether another holds the section; one that waits lets them run."""
+        holder = self._sections[-1] if self._sections else thread
+        return holder is not thread and not holder.is_waiting
 
     def _advance(self, thread: Thread) -> Wait | None:
         meter = self._meter
@@ -185,13 +194,13 @@ class Scheduler:
             return None
         finally:
             thread.line, thread.left, thread.depth = meter.line, meter.left, meter.depth
-        if isinstance(wait, Wait):
+        if isinstance(wait, Wait) and wait is not Wait.OUTSIDE:
             return wait
         if not self._may_take_time:
             raise ScriptRuntimeError(
                 "a secondary program may not take physical time: no sync, sleep or motion in a sec"
             )
-        return None
+        return wait
 
     def _thread(self, handle: Value, word: str) -> Thread | None:
         if type(handle) is not int:
@@ -202,6 +211,5 @@ class Scheduler:
         thread.is_alive = False
         self._threads = {handle: other for handle, other in self._threads.items() if other is not thread}
         self._held_off.discard(thread)
-        if self._holder is thread:
-            self._holder = None
-            self._n_entered = 0
+        if thread in self._sections:
+            self._sections = [holder for holder in self._sections if holder is not thread]

@@ -14,12 +14,13 @@ from sim_twin.controller.script.builtins.arguments import flag, integer, number,
 from sim_twin.controller.script.builtins.connection import Connection
 from sim_twin.controller.script.builtins.waiting import slices_in
 from sim_twin.controller.script.code import Builtins
+from sim_twin.controller.script.threads import Wait
 from sim_twin.controller.script.values import Value, text_of
 
 __all__ = ["Sockets"]
 
 T = TypeVar("T")
-_Waiting: TypeAlias = Generator[None, None, T]
+_Waiting: TypeAlias = Generator[Wait, None, T]
 
 _FIRST = "socket_0"
 _OPEN_TIMEOUT_S = 2.0
@@ -69,7 +70,7 @@ class Sockets:
                 return True
             if connection.is_lost:
                 break
-            yield
+            yield Wait.OUTSIDE
         self._close(name)
         return False
 
@@ -106,7 +107,7 @@ class Sockets:
             if taken is not None or connection.is_lost or (n_slices and n_waited >= n_slices):
                 return taken
             n_waited += 1
-            yield
+            yield Wait.OUTSIDE
         return None
 
     def _read_string(

@@ -5,6 +5,7 @@ from functools import partial
 import pytest
 
 from sim_twin.controller.script import Status
+from sim_twin.controller.script.threads import Wait
 from tests.support.scripts import Log, ScriptRun, program
 
 COUNTER = """
@@ -399,3 +400,50 @@ class Lift:
 @pytest.mark.parametrize("builtin", [Lift().up, Lift(), partial(Lift().up, height=1)])
 def test_whatever_is_a_generator_when_called_may_take_time(builtin):
     assert schedule("note(lift())", lift=builtin) == [(3, 1)]
+
+
+def test_a_join_inside_a_critical_section_lets_the_joined_thread_end():
+    notes = schedule(
+        """
+        global go = True
+        thread t():
+            while go:
+                enter_critical
+                sync()
+                exit_critical
+            end
+            note("ended")
+        end
+        handle = run t()
+        sync()
+        enter_critical
+        go = False
+        join handle
+        note("joined")
+        sync()
+        exit_critical
+        """
+    )
+    assert [what for _, what in notes] == ["ended", "joined"]
+
+
+def test_a_wait_for_something_outside_holds_nobody_off():
+    def read():
+        for _ in range(3):
+            yield Wait.OUTSIDE
+        return 7
+
+    body = """
+    thread t():
+        while True:
+            note("t")
+            sync()
+        end
+    end
+    run t()
+    enter_critical
+    got = read()
+    note(got)
+    exit_critical
+    """
+    assert schedule(body, read=read) == [(1, "t"), (2, "t"), (3, "t"), (4, 7)]

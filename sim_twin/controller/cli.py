@@ -1,0 +1,70 @@
+"""`autotelic controller`: a virtual UR controller on a loopback address, and faults for one that runs."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from typer import Typer
+
+__all__ = ["app"]
+
+app = Typer(help="A virtual UR controller in front of the twin; unmodified clients connect to it.")
+HostOption = Annotated[str, typer.Option("--host", help="Address to listen on; every robot needs its own.")]
+
+
+@app.callback(invoke_without_command=True)
+def controller(
+    context: typer.Context,
+    *,
+    host: HostOption = "127.0.0.2",
+    allow_any: Annotated[bool, typer.Option("--allow-any", help="Listen on an address that others can reach.")] = False,
+    version: Annotated[str, typer.Option("--version", help="PolyScope version that is announced.")] = "5.11.0",
+    scenario: Annotated[str, typer.Option("--scenario", "-s", help="A shipped scenario's name or a file.")] = "paper",
+    seed: Annotated[int, typer.Option("--seed", min=0, help="Which table is drawn.")] = 0,
+    powered: Annotated[bool, typer.Option("--powered/--unpowered", help="Begin with power on.")] = True,
+    script: Annotated[Path | None, typer.Option("--script", help="URScript file to run at the start.")] = None,
+) -> None:
+    """Run a virtual UR controller until Ctrl-C; unmodified clients connect to it."""
+    if context.invoked_subcommand is not None:
+        return
+    from sim_twin.controller.server import ControllerServer, Setup
+
+    try:
+        text = "" if script is None else script.read_text(encoding="utf-8")
+        setup = Setup(
+            host=host,
+            version=version,
+            scenario=scenario,
+            seed=seed,
+            is_powered=powered,
+            is_any_host_allowed=allow_any,
+            script=text,
+        )
+        server = ControllerServer(setup)
+        with server:
+            server.run(when_ready=lambda: typer.echo(f"virtual UR5e {version} ready on {host}"))
+    except (OSError, ValueError) as error:
+        typer.echo(f"error: {error}", err=True)
+        raise typer.Exit(2) from None
+    except KeyboardInterrupt:
+        typer.echo("stopped")
+
+
+@app.command()
+def fault(
+    host: Annotated[str, typer.Argument(help="Address of a running controller.")],
+    name: Annotated[str, typer.Argument(help="What to bring about; an unknown name lists them.")],
+    numbers: Annotated[list[str] | None, typer.Argument(help="Arguments as name=value, the value in JSON.")] = None,
+) -> None:
+    """Bring a fault about at a running controller, e.g. `fault 127.0.0.2 delay ms=20`."""
+    import msgspec
+
+    from sim_twin.controller.process import ControllerProcessError, ask_fault
+
+    try:
+        pairs = dict(number.split("=", 1) for number in numbers or [])
+        given = {key: msgspec.json.decode(value) for key, value in pairs.items()}
+        typer.echo(msgspec.json.encode(ask_fault(host, name, **given)).decode())
+    except (ControllerProcessError, ValueError, msgspec.DecodeError) as error:
+        typer.echo(f"error: {error}", err=True)
+        raise typer.Exit(1) from None

@@ -1,0 +1,129 @@
+"""From the text of a program to one that can be stepped; off the loop where there is one."""
+
+import queue
+import threading
+from collections import deque
+from collections.abc import Callable
+from typing import Protocol
+
+import msgspec
+
+from sim_twin.controller.motion import SLICE_S
+from sim_twin.controller.script import Builtins, Interpreter, ScriptSyntaxError, parse_program
+from sim_twin.controller.script.builtins import Sockets
+
+__all__ = ["Compiled", "Compiler", "InlineCompiler", "Mistake", "ThreadCompiler", "compile_text"]
+
+MakeBuiltins = Callable[[Sockets], Builtins]
+
+
+class Mistake(msgspec.Struct, frozen=True, kw_only=True):
+    """Why a text is no program."""
+
+    message: str
+    line: int = 0
+    column: int = 0
+
+
+class Compiled:
+    """A program that waits for its first slice.
+
+    Attributes:
+        name: As its `def` has it; empty for bare statements.
+        is_secondary: It runs beside the program.
+        interpreter: Ready to step.
+        sockets: Its connections.
+    """
+
+    def __init__(self, name: str, *, is_secondary: bool, interpreter: Interpreter, sockets: Sockets) -> None:
+        self.name, self.is_secondary = name, is_secondary
+        self.interpreter, self.sockets = interpreter, sockets
+
+    def close(self) -> None:
+        """End it."""
+        self.interpreter.stop()
+        self.sockets.close()
+
+
+class Compiler(Protocol):
+    """Takes texts and hands out programs in the same order."""
+
+    def submit(self, text: str) -> None:
+        """Take a text; never wait."""
+        ...
+
+    def take(self) -> Compiled | Mistake | None:
+        """Return the next that is done, or None."""
+        ...
+
+    def close(self) -> None:
+        """Take no more."""
+        ...
+
+
+def compile_text(text: str, make_builtins: MakeBuiltins) -> Compiled | Mistake:
+    """Parse and compile one program."""
+    try:
+        program = parse_program(text)
+        sockets = Sockets(slice_s=SLICE_S)
+        interpreter = Interpreter(program, make_builtins(sockets))
+    except ScriptSyntaxError as error:
+        return Mistake(message=str(error), line=error.line, column=error.column)
+    except RecursionError:
+        return Mistake(message="the program is nested too deep; use fewer brackets and blocks in one another")
+    return Compiled(program.name, is_secondary=program.is_secondary, interpreter=interpreter, sockets=sockets)
+
+
+class InlineCompiler:
+    """Compiles at once: every run is the same, however long it takes."""
+
+    def __init__(self, make_builtins: MakeBuiltins) -> None:
+        self._make_builtins = make_builtins
+        self._done: deque[Compiled | Mistake] = deque()
+
+    def submit(self, text: str) -> None:
+        """Compile."""
+        self._done.append(compile_text(text, self._make_builtins))
+
+    def take(self) -> Compiled | Mistake | None:
+        """Return the next, or None."""
+        return self._done.popleft() if self._done else None
+
+    def close(self) -> None:
+        """Nothing to end."""
+
+
+class ThreadCompiler:
+    """Compiles in a thread of its own, begun with the first text: a script of 40 kB costs ten slices."""
+
+    def __init__(self, make_builtins: MakeBuiltins) -> None:
+        self._make_builtins = make_builtins
+        self._texts: queue.SimpleQueue[str | None] = queue.SimpleQueue()
+        self._done: deque[Compiled | Mistake] = deque()
+        self._thread: threading.Thread | None = None
+
+    def submit(self, text: str) -> None:
+        """Queue a text."""
+        if self._thread is None:
+            self._thread = threading.Thread(target=self._work, name="compiler", daemon=True)
+            self._thread.start()
+        self._texts.put(text)
+
+    def take(self) -> Compiled | Mistake | None:
+        """Return the next that is done, or None."""
+        return self._done.popleft() if self._done else None
+
+    def close(self) -> None:
+        """End the thread after what it has."""
+        if self._thread is not None:
+            self._texts.put(None)
+            self._thread.join()
+            self._thread = None
+
+    def _work(self) -> None:
+        while (text := self._texts.get()) is not None:
+            try:
+                done = compile_text(text, self._make_builtins)
+            except Exception as error:  # noqa: BLE001 - the thread's outermost frame: nobody else would hear of it
+                done = Mistake(message=f"the compiler failed: {error!r}")
+            self._done.append(done)

@@ -1,0 +1,82 @@
+"""What the controller says: a log of its own, and robot messages for the primary port."""
+
+from collections import deque
+from collections.abc import Callable
+
+from sim_twin.controller.script.builtins import Popup
+from sim_twin.controller.wire.primary_messages import (
+    ReportLevel,
+    pack_error_code,
+    pack_key,
+    pack_popup,
+    pack_runtime_exception,
+    pack_text,
+)
+
+__all__ = ["Journal"]
+
+N_LINES = 1000
+
+
+class Journal:
+    """Lines with their slice, messages that wait to be sent, the popup that is open.
+
+    Args:
+        stamp_us: The controller's own time.
+
+    Attributes:
+        lines: The log's last lines, each (stamp in µs, text).
+        outbox: Robot messages as bytes; whoever owns the ports takes them.
+        popup: What a person is asked to read, None where nothing is.
+    """
+
+    def __init__(self, *, stamp_us: Callable[[], int]) -> None:
+        self._stamp_us = stamp_us
+        self.lines: deque[tuple[int, str]] = deque(maxlen=N_LINES)
+        self.outbox: deque[bytes] = deque(maxlen=N_LINES)
+        self.popup: Popup | None = None
+
+    def note(self, text: str) -> None:
+        """Write a line to the log."""
+        self.lines.append((self._stamp_us(), text))
+
+    def log(self, text: str) -> None:
+        """Take a program's textmsg."""
+        self.note(text)
+        self.outbox.append(pack_text(text, stamp_us=self._stamp_us()))
+
+    def show(self, popup: Popup) -> None:
+        """Open a program's popup."""
+        self.popup = popup
+        self.note(f"popup {popup.title}: {popup.text}")
+        self.outbox.append(
+            pack_popup(
+                popup.title,
+                popup.text,
+                stamp_us=self._stamp_us(),
+                is_warning=popup.is_warning,
+                is_error=popup.is_error,
+                is_blocking=popup.is_blocking,
+            )
+        )
+
+    def is_popup_open(self) -> bool:
+        """Return whether a popup waits to be read."""
+        return self.popup is not None
+
+    def key(self, title: str, text: str) -> None:
+        """Say what became of a program, such as PROGRAM_XXX_STARTED and its name."""
+        self.note(f"{title}: {text}")
+        self.outbox.append(pack_key(0, stamp_us=self._stamp_us(), title=title, text=text))
+
+    def exception(self, *, program: str, thread: str, line: int, column: int, message: str) -> None:
+        """Say where a program failed, and why."""
+        self.note(f"program {program}, thread {thread}, line {line}: {message}")
+        text = f"{program}: {message}"
+        self.outbox.append(pack_runtime_exception(line, column, text, stamp_us=self._stamp_us()))
+
+    def error(self, code: int, argument: int, text: str, *, is_violation: bool = False) -> None:
+        """Say why the robot stopped."""
+        self.note(f"C{code}A{argument}: {text}")
+        level = ReportLevel.VIOLATION if is_violation else ReportLevel.WARNING
+        self.outbox.append(pack_error_code(code, argument, stamp_us=self._stamp_us(), level=level, text=text))

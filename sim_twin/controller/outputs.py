@@ -1,0 +1,203 @@
+"""RTDE's outputs by name: what each field is read from. What the twin does not have is a quiet robot's constant."""
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+
+from sim_twin.controller.builtins.state import JOINT_C
+from sim_twin.controller.machine import Machine
+from sim_twin.controller.motion import DhRow
+from sim_twin.controller.motion.poses import Array
+from sim_twin.controller.program import Programs
+from sim_twin.controller.states import RobotMode
+from sim_twin.controller.wire import Outputs, Value
+
+__all__ = ["BUS_V", "JOINT_V", "elbow", "joint_mode", "make_outputs"]
+
+Getters = dict[str, Callable[[], Value]]
+BUS_V, JOINT_V = 48.0, 48.0
+JOINT_RUNNING, JOINT_IDLE, JOINT_POWER_OFF = 253, 255, 239
+_BYTE = 0xFF
+_STEP_S = 1e-6
+_NO_VECTOR = (0.0,) * 6
+_NOT_THERE = (
+    "actual_momentum",
+    "io_current",
+    "euromap67_24V_voltage",
+    "euromap67_24V_current",
+    "tool_output_current",
+    "actual_robot_energy_consumed",
+    "actual_robot_braking_energy_dissipated",
+    "joint_position_deviation_ratio",
+    "collision_detection_ratio",
+)
+_NOT_COUNTED = (
+    "euromap67_input_bits",
+    "euromap67_output_bits",
+    "tool_analog_input_types",
+    "encoder0_raw",
+    "encoder1_raw",
+    "tool_output_mode",
+    "tool_digital_output0_mode",
+    "tool_digital_output1_mode",
+)
+
+
+def make_outputs(machine: Machine, programs: Programs) -> Outputs:
+    """Return a getter for every output field."""
+    return {
+        **machine.registers.getters(),
+        **_asked(machine),
+        **_measured(machine),
+        **_forces(machine),
+        **_modes(machine, programs),
+        **_terminals(machine),
+        **_told(machine),
+        **_constants(),
+    }
+
+
+def joint_mode(machine: Machine) -> int:
+    """Return UR's number for what the joints do."""
+    robot = machine.modes.robot
+    if robot is RobotMode.RUNNING:
+        return JOINT_RUNNING
+    return JOINT_IDLE if robot in (RobotMode.IDLE, RobotMode.POWER_ON, RobotMode.BACKDRIVE) else JOINT_POWER_OFF
+
+
+def elbow(rows: tuple[DhRow, ...], q_rad: Array) -> tuple[float, float, float]:
+    """Return where the elbow is, base axes (m): the end of the table's second row.  (6,) -> (3,)"""
+    base, shoulder = rows[0], rows[1]
+    q_1, q_2 = q_rad[0].item() + base.theta_rad, q_rad[1].item() + shoulder.theta_rad
+    c, s, ca, sa = math.cos(q_1), math.sin(q_1), math.cos(base.alpha_rad), math.sin(base.alpha_rad)
+    u, v, w = shoulder.a_m * math.cos(q_2), shoulder.a_m * math.sin(q_2), shoulder.d_m
+    return (
+        base.a_m * c + c * u - s * ca * v + s * sa * w,
+        base.a_m * s + s * u + c * ca * v - c * sa * w,
+        base.d_m + sa * v + ca * w,
+    )
+
+
+def _asked(machine: Machine) -> Getters:
+    setpoint, drive = machine.drive.motions.setpoint, machine.drive
+    return {
+        "target_q": lambda: setpoint.q_target.tolist(),
+        "target_qd": lambda: setpoint.qd_target.tolist(),
+        "target_qdd": lambda: setpoint.qdd_target.tolist(),
+        "target_current": lambda: drive.measured.current_a.tolist(),
+        "target_moment": lambda: drive.measured.torque_nm.tolist(),
+        "target_TCP_pose": lambda: machine.target_tool()[0],
+        "target_TCP_speed": lambda: machine.target_tool()[1],
+        "joint_control_output": lambda: drive.measured.current_a.tolist(),
+    }
+
+
+def _measured(machine: Machine) -> Getters:
+    drive = machine.drive
+    rows = drive.kinematics.rows
+
+    def elbow_velocity() -> list[float]:
+        q, qd = drive.measured.q_rad, drive.measured.qd_rad_s
+        after, before = elbow(rows, q + qd * _STEP_S), elbow(rows, q)
+        return [(b - a) / _STEP_S for a, b in zip(before, after, strict=True)]
+
+    return {
+        "actual_q": lambda: drive.measured.q_rad.tolist(),
+        "actual_qd": lambda: drive.measured.qd_rad_s.tolist(),
+        "actual_current": lambda: drive.measured.current_a.tolist(),
+        "actual_current_as_torque": lambda: drive.measured.torque_nm.tolist(),
+        "actual_TCP_pose": lambda: drive.measured.tcp_pose.tolist(),
+        "actual_TCP_speed": lambda: drive.measured.tcp_speed.tolist(),
+        "actual_tool_accelerometer": machine.tool_acceleration,
+        "actual_robot_current": lambda: float(np.abs(drive.measured.current_a).sum()),
+        "elbow_position": lambda: elbow(rows, drive.measured.q_rad),
+        "elbow_velocity": elbow_velocity,
+    }
+
+
+def _forces(machine: Machine) -> Getters:
+    drive = machine.drive
+
+    def wrench() -> list[float]:
+        return drive.measured.wrench.tolist()
+
+    return {
+        "actual_TCP_force": wrench,
+        "ft_raw_wrench": wrench,
+        "wrench_calc_from_currents": wrench,
+        "tcp_force_scalar": lambda: float(np.linalg.norm(drive.measured.wrench[:3])),
+        "target_base_wrench": lambda: _NO_VECTOR,
+    }
+
+
+def _modes(machine: Machine, programs: Programs) -> Getters:
+    modes, pace = machine.modes, machine.drive.core.pace
+    return {
+        "timestamp": lambda: machine.time_s,
+        "control_step": lambda: machine.drive.n_slices,
+        "actual_execution_time": lambda: machine.execution_s * 1e3,
+        "target_execution_time": lambda: 0.0,
+        "speed_scaling": lambda: pace.scale,
+        "target_speed_fraction": lambda: pace.slider,
+        "time_scale_source": lambda: 0,
+        "robot_mode": lambda: int(modes.robot),
+        "safety_mode": lambda: int(modes.safety),
+        "safety_status": lambda: int(modes.safety),
+        "runtime_state": lambda: int(modes.runtime),
+        "robot_status_bits": lambda: modes.robot_status_bits,
+        "safety_status_bits": lambda: modes.safety_status_bits,
+        "script_control_line": lambda: programs.line,
+        "joint_mode": lambda: (joint_mode(machine),) * 6,
+        "tool_mode": lambda: joint_mode(machine),
+    }
+
+
+def _terminals(machine: Machine) -> Getters:
+    io = machine.io
+
+    def analog(i: int) -> float:
+        share = io.analog_out[i]
+        return share * 10.0 if io.analog_out_domain[i] else 0.004 + 0.016 * share
+
+    return {
+        "actual_digital_input_bits": lambda: io.digital_in,
+        "actual_digital_output_bits": lambda: io.digital_out,
+        "actual_configurable_digital_input_bits": lambda: io.digital_in >> 8 & _BYTE,
+        "actual_configurable_digital_output_bits": lambda: io.digital_out >> 8 & _BYTE,
+        "analog_io_types": lambda: io.analog_out_domain[0] << 2 | io.analog_out_domain[1] << 3,
+        "standard_analog_input0": lambda: io.analog_in[0],
+        "standard_analog_input1": lambda: io.analog_in[1],
+        "standard_analog_output0": lambda: analog(0),
+        "standard_analog_output1": lambda: analog(1),
+        "tool_analog_input0": lambda: io.tool_analog_in[0],
+        "tool_analog_input1": lambda: io.tool_analog_in[1],
+        "tool_output_voltage": lambda: io.tool_voltage_v,
+    }
+
+
+def _told(machine: Machine) -> Getters:
+    drive = machine.drive
+    return {
+        "tcp_offset": lambda: drive.core.tcp_offset.tolist(),
+        "payload": lambda: drive.payload[0],
+        "payload_cog": lambda: list(drive.payload[1]),
+        "payload_inertia": lambda: machine.payload_inertia,
+        "target_gravity": lambda: machine.gravity,
+    }
+
+
+def _constants() -> Getters:
+    values: dict[str, Value] = {
+        "actual_current_window": (1.0,) * 6,
+        "actual_TCP_acceleration": _NO_VECTOR,
+        "target_TCP_acceleration": _NO_VECTOR,
+        "target_base_acceleration": _NO_VECTOR,
+        "joint_temperatures": (JOINT_C,) * 6,
+        "actual_joint_voltage": (JOINT_V,) * 6,
+        "actual_main_voltage": BUS_V,
+        "actual_robot_voltage": BUS_V,
+        "tool_temperature": JOINT_C,
+    }
+    values |= dict.fromkeys(_NOT_THERE, 0.0) | dict.fromkeys(_NOT_COUNTED, 0)
+    return {name: lambda value=value: value for name, value in values.items()}

@@ -1,0 +1,130 @@
+"""The virtual robot: everything behind the ports, one 2 ms slice at a time. It knows no clock."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import msgspec
+import numpy as np
+
+from config.loader import resolve
+from sim_twin.controller.builtins import program_builtins
+from sim_twin.controller.compiling import Compiler, InlineCompiler, MakeBuiltins
+from sim_twin.controller.hand import Hand
+from sim_twin.controller.io import BOX_BITS
+from sim_twin.controller.machine import Machine
+from sim_twin.controller.motion import SLICE_S, Breach, Measured
+from sim_twin.controller.outputs import make_outputs
+from sim_twin.controller.panel import Panel
+from sim_twin.controller.program import Programs
+from sim_twin.controller.states import Event, RobotMode, RuntimeState
+from sim_twin.controller.watchdogs import WatchdogAction
+from sim_twin.controller.wire import ControllerVersion, ScriptSource
+from sim_twin.layout import draw_layout
+from sim_twin.plant import TwinWorld
+
+__all__ = ["VirtualRobot", "make_world"]
+
+_PROTECTIVE_BIT, _VIOLATION_BIT = 1 << 2, 1 << 8
+_STARVED = {WatchdogAction.PAUSE: Event.PAUSE, WatchdogAction.STOP: Event.STOP}
+
+
+def make_world(*, scenario: str | Path = "paper", rig: str | Path = "twin", seed: int = 0) -> TwinWorld:
+    """Return a twin whose tick is one slice, its table drawn and its arm at home.
+
+    Raises:
+        ConfigError: a file is missing or wrong.
+    """
+    resolved = resolve(rig=rig, scenario=scenario)
+    times = msgspec.structs.replace(resolved.rig, tick_s=SLICE_S, physics_s=SLICE_S)
+    world = TwinWorld(resolved.arm, resolved.scenario, times)
+    world.put(draw_layout(resolved.scenario, np.random.default_rng([seed, 0])), resolved.arm.home_rad, digital_out=0)
+    return world
+
+
+class VirtualRobot:
+    """One controller and its arm.
+
+    Args:
+        world: The twin; `make_world` makes one.
+        version: What the controller announces.
+        is_powered: Begin with power on and brakes open.
+        compiler: Makes programs of texts from builtins; inline, and so deterministic, where absent.
+
+    Attributes:
+        machine: Drive, modes, registers, terminals.
+        programs: What runs.
+        hand: The gripper; wire.GripperTarget.
+        outputs: RTDE's outputs by name.
+        panel: wire.DashboardTarget and wire.StateSource.
+        disturb: Fault: what becomes of a measurement before anybody sees it.
+        forced_inputs: Fault: input bits that are on whatever the table says.
+    """
+
+    def __init__(
+        self,
+        world: TwinWorld,
+        *,
+        version: ControllerVersion | None = None,
+        is_powered: bool = True,
+        compiler: Callable[[MakeBuiltins], Compiler] = InlineCompiler,
+    ) -> None:
+        self.machine = Machine(world, version=version or ControllerVersion())
+        self.programs = Programs(self.machine, compiler(lambda sockets: program_builtins(self.machine, sockets)))
+        modes = self.machine.modes
+        self.hand = Hand(world, is_powered=lambda: modes.robot not in (RobotMode.POWER_OFF, RobotMode.NO_CONTROLLER))
+        self.outputs = make_outputs(self.machine, self.programs)
+        self.panel = Panel(self.machine, self.programs)
+        self.disturb: Callable[[Measured], Measured] | None = None
+        self.forced_inputs = 0
+        if is_powered:
+            modes.robot = RobotMode.RUNNING
+            self.machine.drive.engage()
+
+    def submit_script(self, text: str, source: ScriptSource | None = None) -> None:
+        """Take one complete program; wire.ScriptSink. In local control programs are refused."""
+        if self.machine.modes.is_remote or source is None:
+            self.programs.submit(text)
+        else:
+            self.machine.journal.note("a program was sent in local control and is ignored")
+
+    def step(self) -> None:
+        """Let one slice pass; clients' inputs have been taken before."""
+        machine, drive = self.machine, self.machine.drive
+        machine.io.apply()
+        self._watch()
+        self.programs.step()
+        machine.world.digital_out = machine.io.digital_out & BOX_BITS
+        breach = drive.tick()
+        if self.disturb is not None:
+            drive.measured = self.disturb(drive.measured)
+        if breach is not None:
+            self._stop_for(breach)
+        self.programs.obey(machine.modes.tick(is_standing=drive.is_standing))
+        machine.n_standing = machine.n_standing + 1 if drive.is_standing else 0
+        machine.io.digital_in = machine.world.table.read_inputs() | self.forced_inputs
+        self.hand.tick()
+
+    def close(self) -> None:
+        """End programs and their connections."""
+        self.programs.close()
+
+    def _watch(self) -> None:
+        machine = self.machine
+        if machine.modes.runtime is not RuntimeState.PLAYING:
+            return
+        starved = machine.watchdogs.tick()
+        if starved is not None:
+            name, action = starved
+            machine.journal.note(f"watchdog: {name} was not written in time, the program is to {action.value}")
+            self.programs.handle(_STARVED[action])
+
+    def _stop_for(self, breach: Breach) -> None:
+        cause = breach.cause
+        is_stopped = self.machine.modes.safety_status_bits & (_VIOLATION_BIT if cause.is_violation else _PROTECTIVE_BIT)
+        if is_stopped:
+            # What presses goes on pressing: one blow is one stop.
+            return
+        argument = cause.value[1] if breach.joint is None else breach.joint
+        self.machine.journal.error(cause.code, argument, breach.text, is_violation=cause.is_violation)
+        event = Event.VIOLATION if cause.is_violation else Event.PROTECTIVE_STOP
+        self.programs.handle(event, joint=breach.joint)

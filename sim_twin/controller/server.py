@@ -1,0 +1,159 @@
+"""The controller as a process: ports, robot, wall time, faults. One loop, one slice at a time."""
+
+import gc
+import sys
+from collections.abc import Callable
+from ipaddress import ip_address
+from time import perf_counter
+from types import TracebackType
+from typing import Self
+
+import msgspec
+
+from sim_twin.controller.compiling import ThreadCompiler
+from sim_twin.controller.control_port import CONTROL, ControlPort
+from sim_twin.controller.faults import Faults
+from sim_twin.controller.motion import SLICE_S
+from sim_twin.controller.pacing import Pacer
+from sim_twin.controller.robot import VirtualRobot, make_world
+from sim_twin.controller.ticks import TickTimes
+from sim_twin.controller.wire import ControllerVersion, Wires
+from sim_twin.controller.wire.reactor import Reactor
+
+__all__ = ["ControllerServer", "Setup", "parse_version"]
+
+CONTROL_TICKS = 5
+"""The faults' door is looked at this often: a look costs as much as a tenth of the physics."""
+SWITCH_S = 0.0002
+"""How long the compiler's thread may keep the interpreter from the loop."""
+
+
+class Setup(msgspec.Struct, frozen=True, kw_only=True):
+    """What a controller is started with."""
+
+    host: str = "127.0.0.2"
+    version: str = "5.11.0"
+    scenario: str = "paper"
+    seed: int = 0
+    is_powered: bool = True
+    is_any_host_allowed: bool = False
+    script: str = ""
+    """Text of a program to run at the start."""
+
+
+def parse_version(text: str) -> ControllerVersion:
+    """Return the version of three or four numbers with dots.
+
+    Raises:
+        ValueError: it is none.
+    """
+    parts = text.split(".")
+    if not 2 <= len(parts) <= 4 or not all(part.isdigit() for part in parts):
+        raise ValueError(f"version: expected numbers such as 5.11.0, got {text!r}")
+    fields = dict(zip(("major", "minor", "bugfix", "build"), map(int, parts), strict=False))
+    return ControllerVersion(**fields)
+
+
+class ControllerServer:
+    """One virtual controller on its ports.
+
+    Args:
+        setup: What it is started with.
+
+    Attributes:
+        robot: The robot behind the ports.
+        wires: The ports.
+        faults: What can be made to go wrong.
+        ticks: What slices cost.
+
+    Raises:
+        ValueError: the host is no loopback address and that is not allowed, or the version is none.
+    """
+
+    def __init__(self, setup: Setup) -> None:
+        if not setup.is_any_host_allowed and not ip_address(setup.host).is_loopback:
+            raise ValueError(
+                f"host: expected a loopback address, got {setup.host}; a virtual robot obeys anybody who connects, "
+                "so others must be allowed with --allow-any"
+            )
+        self.setup = setup
+        version = parse_version(setup.version)
+        world = make_world(scenario=setup.scenario, seed=setup.seed)
+        self.robot = robot = VirtualRobot(world, version=version, is_powered=setup.is_powered, compiler=ThreadCompiler)
+        self.wires = Wires(
+            outputs=robot.outputs,
+            inputs=robot.machine,
+            dashboard=robot.panel,
+            states=robot.panel,
+            scripts=robot,
+            gripper=robot.hand,
+            version=version,
+            stamp_us=lambda: robot.machine.stamp_us,
+        )
+        self.ticks = TickTimes()
+        self.faults = Faults(robot, self.wires, self.ticks, seed=setup.seed)
+        self._control = Reactor()
+        self._n_ticks = 0
+
+    def __enter__(self) -> Self:
+        """Open the ports.
+
+        Raises:
+            OSError: a port is taken.
+        """
+        try:
+            self.wires.open(self.setup.host)
+            if ip_address(self.setup.host).is_loopback:
+                self._control.listen(self.setup.host, CONTROL, ControlPort(self.faults))
+        except OSError:
+            self.close()
+            raise
+        if self.setup.script:
+            self.robot.submit_script(self.setup.script)
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Shut the ports and end the programs; a second call does nothing."""
+        self._control.close()
+        self.wires.close()
+        self.robot.close()
+
+    def tick(self) -> None:
+        """Poll, let one slice pass, and send what is due."""
+        begun = perf_counter()
+        self._n_ticks += 1
+        if self._n_ticks % CONTROL_TICKS == 0:
+            self._control.poll()
+        if not self.faults.is_frozen:
+            self.wires.poll()
+            self.robot.step()
+            outbox = self.robot.machine.journal.outbox
+            while outbox:
+                self.wires.states.tell(outbox.popleft())
+            self.wires.tick(self.robot.machine.drive.n_slices)
+        spent_s = perf_counter() - begun
+        self.robot.machine.execution_s = spent_s
+        self.ticks.add(spent_s)
+
+    def run(self, *, when_ready: Callable[[], None], is_over: Callable[[], bool] = lambda: False) -> None:
+        """Run in wall time until somebody ends it.
+
+        Args:
+            when_ready: Called when the ports are open.
+            is_over: Asked before every slice.
+        """
+        sys.setswitchinterval(SWITCH_S)
+        gc.collect()
+        gc.freeze()
+        when_ready()
+        pacer = Pacer(period_ns=round(SLICE_S * 1e9))
+        while not is_over() and not self.robot.panel.is_shut_down:
+            self.tick()
+            self.faults.delay()
+            pacer.wait()
+            self.ticks.n_missed = pacer.n_missed

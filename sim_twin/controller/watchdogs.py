@@ -1,0 +1,58 @@
+"""rtde_set_watchdog: what happens when a client stops writing an input. Counted in slices."""
+
+import math
+from enum import Enum
+
+__all__ = ["WatchdogAction", "Watchdogs"]
+
+SLICES_PER_S = 500.0
+
+
+class WatchdogAction(Enum):
+    """What a starved watchdog does to the program."""
+
+    IGNORE = "ignore"
+    PAUSE = "pause"
+    STOP = "stop"
+
+
+class _Watchdog:
+    def __init__(self, n_slices: int, action: WatchdogAction) -> None:
+        self.n_slices, self.action = n_slices, action
+        self.n_waited = 0
+
+
+class Watchdogs:
+    """The watchdogs of the program that runs; all end with it."""
+
+    def __init__(self) -> None:
+        self._watched: dict[str, _Watchdog] = {}
+
+    def set(self, name: str, frequency_hz: float, action: WatchdogAction) -> None:
+        """Expect a variable to be written so often from now on.
+
+        Raises:
+            ValueError: the frequency is not above 0.
+        """
+        if not frequency_hz > 0.0:
+            raise ValueError(f"expected a frequency above 0 Hz, got {frequency_hz}")
+        self._watched[name] = _Watchdog(max(1, math.ceil(SLICES_PER_S / frequency_hz - 1e-9)), action)
+
+    def wrote(self, name: str) -> None:
+        """Note that a client wrote a variable."""
+        watched = self._watched.get(name)
+        if watched is not None:
+            watched.n_waited = 0
+
+    def tick(self) -> tuple[str, WatchdogAction] | None:
+        """Let one slice pass; return the variable whose time ran out in it, and what to do."""
+        starved = None
+        for name, watched in self._watched.items():
+            watched.n_waited += 1
+            if watched.n_waited == watched.n_slices + 1 and watched.action is not WatchdogAction.IGNORE:
+                starved = name, watched.action
+        return starved
+
+    def clear(self) -> None:
+        """Forget all: the program ended."""
+        self._watched.clear()
