@@ -29,6 +29,7 @@ __all__ = ["evaluate", "explain", "learn", "report"]
 
 EXIT_FAILED, EXIT_USAGE, EXIT_INTERRUPTED = 1, 2, 130
 MAX_WORKERS = 4
+WIDE = 180
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -152,7 +153,10 @@ def explain(
     if json:
         typer.echo(msgspec.json.encode({"goals": goals, "explanations": explanations}).decode())
     else:
-        Console().print(explanation_table(explanations, goals))
+        console = Console()
+        # Goals' names are long: where nobody has set a width, in a pipe, none is cut.
+        width = console.width if console.is_terminal else max(console.width, WIDE)
+        console.print(explanation_table(explanations, goals), width=width)
 
 
 @_one_line_errors

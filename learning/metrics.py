@@ -217,9 +217,7 @@ def _summarise_era(
         until_epoch=era.until_epoch,
         learnt_after=_since(era, first_running(mastered, running=2)),
         graph_right_after=_since(era, first_running(right, running=1)),
-        success_by_goal=tuple(
-            _ratio(_total(of_goal, "n_successes"), _total(of_goal, "n_all")) for of_goal in settled
-        ),
+        success_by_goal=tuple(_ratio(_total(of_goal, "n_successes"), _total(of_goal, "n_all")) for of_goal in settled),
         trials_by_goal=trials,
         optimal_by_goal=tuple(optima),
         trials_over_optimum=_mean_excess(trials, optima),

@@ -35,6 +35,7 @@ def picture(
     ] = "",
 ) -> None:
     """Draw one table to a PNG file (needs EGL or OSMesa)."""
+    _check_out(out, ".png")
     os.environ.setdefault("MUJOCO_GL", "egl")
     from matplotlib.image import imsave
 
@@ -59,6 +60,7 @@ def model(
     rig: RigOption = "twin",
 ) -> None:
     """Write the table's model as MJCF, to open in any MuJoCo viewer."""
+    _check_out(out, ".xml")
     from config.loader import resolve
     from sim_twin.scene import build_scene
 
@@ -95,3 +97,10 @@ def _bits(outputs: str) -> int:
     if not all(0 <= n < N_OUTPUTS for n in numbers):
         raise typer.BadParameter(f"expected numbers 0..{N_OUTPUTS - 1} with commas, got {outputs!r}")
     return sum(1 << n for n in set(numbers))
+
+
+def _check_out(path: Path, suffix: str) -> None:
+    """Refuse a file that cannot be written, in one line, before anything is made."""
+    if path.suffix != suffix or not path.parent.is_dir():
+        typer.echo(f"error: expected a file {suffix} in a folder that exists, came {path}", err=True)
+        raise typer.Exit(2)

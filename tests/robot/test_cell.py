@@ -111,6 +111,18 @@ def test_no_lid_moves_while_the_tool_is_in_its_sweep_but_lamps_and_other_lids_do
     assert lids(tick(cell)) == {"square_box", "blue_box", "red_box"}
 
 
+def test_a_sweep_reaches_as_far_as_the_tool_and_what_it_holds():
+    # The tool's centre beside the box, or above its lid: its fingers, or what hangs below them, are in the way.
+    box = next(b for b in SCENARIO.boxes if b.name == "red_box")
+    x, y = box.position_m
+    beside = (x, y + box.spread_m[1] + box.inner_m[1] / 2 + box.wall_m + 0.03, 0.1)
+    above = (x, y, SCENARIO.table.height_m + box.height_m + box.inner_m[0] / 2 + 0.02)
+    for place in (beside, above):
+        cell = make()
+        cell.begin_epoch(0)
+        assert "red_box" not in lids(tick(cell, "green_button", tcp=place)), place
+
+
 def test_travel_height_is_above_every_sweep():
     for box in SCENARIO.boxes:
         cell = make()
