@@ -19,6 +19,9 @@ __all__ = [
 ]
 
 Count = Annotated[int, Meta(ge=1, le=1_000_000)]
+Width = Annotated[int, Meta(ge=1, le=4096)]
+Error = Annotated[float, Meta(ge=1e-6, le=0.5)]
+"""A chance of being misled: never none, or one contrary attempt would leave no belief at all."""
 Rate = Annotated[float, Meta(gt=0.0, le=1.0)]
 
 
@@ -65,9 +68,9 @@ class SubgoalSelection(Section, frozen=True, kw_only=True):
     """Prior of a conjunction is exp(-cost * literals)."""
     hazard: Share = 0.01
     """Chance per attempt that the preconditions were drawn anew: the change detector."""
-    false_positive: Share = 0.02
+    false_positive: Error = 0.02
     """Chance that a goal is achieved although its preconditions do not hold."""
-    blocked_error: Share = 0.05
+    blocked_error: Error = 0.05
     """Least chance that a trial counts as blocked although nothing was missing."""
     curiosity: Share = 0.0
     """Chance per epoch that a doubtful precondition is tried out before the plan is followed."""
@@ -86,7 +89,7 @@ class SubgoalSelection(Section, frozen=True, kw_only=True):
 class Expert(Section, frozen=True, kw_only=True):
     """The utility model of one goal."""
 
-    hidden: Annotated[tuple[Count, ...], Meta(min_length=1, max_length=4)] = (64, 64)
+    hidden: Annotated[tuple[Width, ...], Meta(min_length=1, max_length=4)] = (64, 64)
     learning_rate: Positive = 1e-3
     batch: Count = 128
     updates_per_trial: Annotated[int, Meta(ge=0, le=10_000)] = 20
@@ -139,7 +142,7 @@ class ForwardModel(Section, frozen=True, kw_only=True):
     """Who predicts P(t+1) of a candidate move."""
 
     kind: OneOf["geometric", "learned"] = "geometric"
-    hidden: Annotated[tuple[Count, ...], Meta(min_length=1, max_length=4)] = (64, 64)
+    hidden: Annotated[tuple[Width, ...], Meta(min_length=1, max_length=4)] = (64, 64)
     history: Annotated[int, Meta(ge=1, le=64)] = 20
     """Time steps that bearings are told from."""
     learning_rate: Positive = 1e-3

@@ -110,6 +110,11 @@ def _check_names(scenario: Scenario, arm: ArmConfig, file: str) -> None:
 
 def _check_start(scenario: Scenario, arm: ArmConfig, file: str) -> None:
     low, high = arm.motion.workspace_m
+    lowest, travel = (scenario.table.height_m + h for h in arm.motion.heights_m)
+    if lowest < low[2] - ROUNDING_M or travel > high[2] + ROUNDING_M:
+        least, most = low[2] - arm.motion.heights_m[0], high[2] - arm.motion.heights_m[1]
+        expected = f"{least:g} to {most:g}, so that the arm reaches down to the table and clears it"
+        raise ConfigError(file, "table.height_m", expected, f"{scenario.table.height_m:g}")
     for axis in range(3):
         centre, spread = scenario.start.position_m[axis], scenario.start.spread_m[axis]
         least, most = low[axis], high[axis]

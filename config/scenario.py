@@ -156,7 +156,7 @@ class Scenario(Section, frozen=True, kw_only=True):
     buttons: tuple[Button, ...] = ()
     boxes: tuple[Box, ...] = ()
     cylinders: tuple[Cylinder, ...] = ()
-    distances: tuple[Name, ...]
+    distances: Annotated[tuple[Name, ...], Meta(min_length=1, max_length=64)]
     """What d_1..d_n are measured to, in this order; `table` is the table top under the tool."""
     goals: Annotated[tuple[Goal, ...], Meta(min_length=1, max_length=24)]
     schedule: Annotated[tuple[RuleSpan, ...], Meta(min_length=1)]

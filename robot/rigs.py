@@ -1,5 +1,6 @@
 """A rig becomes a station: the implementations that its file names are loaded and put together."""
 
+import inspect
 from collections.abc import Callable
 from importlib import import_module
 from typing import Any
@@ -35,7 +36,7 @@ def load(import_string: str) -> Any:  # noqa: ANN401 - what a string names is kn
 
 def build_plant(*, rig: Rig, arm: ArmConfig, scenario: Scenario) -> Plant:
     """Return the plant that a rig names, not yet connected."""
-    return load(rig.plant)(arm=arm, scenario=scenario, rig=rig)
+    return _make(rig.plant, "plant", arm=arm, scenario=scenario, rig=rig)
 
 
 def build_station(
@@ -49,7 +50,7 @@ def build_station(
         heard_by: A stopwatch's lap that hears of every tick, where the arm is held in this process.
     """
     rig, arm, scenario = resolved.rig, resolved.arm, resolved.scenario
-    perception = load(rig.perception)(scenario=scenario, arm=arm)
+    perception = _make(rig.perception, "perception", scenario=scenario, arm=arm)
     if rig.bus is not None and plant is None:
         return load("robot.lab:build_lab_station")(resolved, perception)  # brings the bus, which lock-step never needs
     world = build_plant(rig=rig, arm=arm, scenario=scenario) if plant is None else plant
@@ -61,4 +62,22 @@ def build_station(
 
 def build_operator(rig: Rig) -> Operator | None:
     """Return who arms this rig's station without hardware, None where a person must."""
-    return None if rig.operator is None else load(rig.operator)()
+    return None if rig.operator is None else _make(rig.operator, "operator")
+
+
+def _make(import_string: str, what: str, **parts: object) -> Any:  # noqa: ANN401
+    """Return what an import string's class makes of its parts.
+
+    Raises:
+        RobotConfigError: it names no class, or one that is made of something else.
+    """
+    kind = load(import_string)
+    if not isinstance(kind, type):
+        raise RobotConfigError(f"{what}: expected an import string of a class, {import_string!r} names {kind!r}")
+    try:
+        inspect.signature(kind).bind(**parts)
+    except TypeError as error:
+        raise RobotConfigError(
+            f"{what}: expected a class that takes {sorted(parts)}, {import_string!r}: {error}"
+        ) from error
+    return kind(**parts)

@@ -1,10 +1,12 @@
 """At a limit of the geometry a scenario passes, a hair beyond it does not."""
 
+from pathlib import Path
+
 import msgspec
 import pytest
 
 from config.errors import ConfigError
-from config.loader import load_arm
+from config.loader import load_arm, resolve
 from config.placing import check_fit, check_placing
 from config.scenario import Box, Button, Cylinder, Goal, GoalKind, Lid, RuleSpan, Scenario, Table
 
@@ -86,3 +88,12 @@ def test_leaves_that_cannot_be_passed_over_are_refused():
     check_fit(table(box_y=0.25, lid_angle=1.85), ARM, "file")
     with pytest.raises(ConfigError, match="below the fingertips at travel height"):
         check_fit(table(box_y=0.25, lid_angle=1.85), low, "file")
+
+
+@pytest.mark.parametrize("height_m", [0.4, -0.5])
+def test_a_table_that_the_arm_cannot_work_on_is_refused(tmp_path, height_m):
+    text = (Path(__file__).parents[2] / "config" / "scenarios" / "paper.yaml").read_text()
+    path = tmp_path / "scenario.yaml"
+    path.write_text(f"{text}\ntable: {{height_m: {height_m}}}\n")
+    with pytest.raises(ConfigError, match=r"table\.height_m"):
+        resolve(scenario=path)

@@ -43,3 +43,19 @@ def test_a_plant_with_another_tick_than_the_rig_is_refused():
     plant = FakePlant(arm=RESOLVED.arm, scenario=RESOLVED.scenario, rig=other)
     with pytest.raises(RobotConfigError, match="tick"):
         build_station(RESOLVED, plant=plant)
+
+
+@pytest.mark.parametrize(
+    ("key", "string", "word"),
+    [
+        ("plant", "os:getcwd", "class"),
+        ("perception", "os:getcwd", "class"),
+        ("operator", "os:getcwd", "class"),
+        ("plant", "decimal:Decimal", "takes"),
+        ("perception", "decimal:Decimal", "takes"),
+    ],
+)
+def test_an_import_string_of_something_else_is_refused_and_never_called(key, string, word):
+    resolved = msgspec.structs.replace(RESOLVED, rig=msgspec.structs.replace(RESOLVED.rig, **{key: string}))
+    with pytest.raises(RobotConfigError, match=word):
+        build_operator(resolved.rig) if key == "operator" else build_station(resolved)
