@@ -28,6 +28,7 @@ __all__ = [
     "load_scenario",
     "load_wired",
     "resolve",
+    "with_rig",
 ]
 
 S = TypeVar("S", bound=msgspec.Struct)
@@ -102,6 +103,24 @@ def resolve(*, rig: str | Path = "twin", scenario: str | Path = "paper", learnin
     )
     _check_together(resolved, files)
     return resolved
+
+
+def with_rig(resolved: Resolved, rig: str | Path) -> Resolved:
+    """Return the same with another rig of the same arm.
+
+    Raises:
+        ConfigError: the rig's file is missing or wrong, or it is another arm's.
+    """
+    source = read_source("rigs", rig)
+    loaded = _load_rig(source)
+    arm = _load_arm(read_source("arms", loaded.arm, base=source.folder))
+    if arm != resolved.arm:
+        raise ConfigError(source.file, "arm", f"the arm that was used before, {resolved.arm.name}", repr(loaded.arm))
+    changed = msgspec.structs.replace(resolved, rig=loaded)
+    n = len(changed.rule_sets)
+    names = _Files(rig=source.file, arm=source.file, scenario="scenario", rule_sets=("rules",) * n, learning="learning")
+    _check_together(changed, names)
+    return changed
 
 
 def load_resolved(path: Path) -> Resolved:

@@ -1,5 +1,6 @@
 """A test of what a run's newest checkpoint holds, apart from the run itself."""
 
+from config.loader import with_rig
 from learning.assembly import RobotLearner
 from learning.errors import LearningError
 from learning.evaluation import GoalTest, evaluation_row, learnt_graph, run_test
@@ -30,7 +31,9 @@ def beliefs_of(folder: RunFolder) -> tuple[Explanation, ...]:
     return explain_graph(graph)
 
 
-def assess(folder: RunFolder, *, n_tests: int, seed: int | None, rules_epoch: int | None) -> list[EvaluationRow]:
+def assess(
+    folder: RunFolder, *, n_tests: int, seed: int | None, rules_epoch: int | None, rig: str | None = None
+) -> list[EvaluationRow]:
     """Return a row a goal: learning off, the newest checkpoint, from fresh table layouts.
 
     Args:
@@ -38,12 +41,16 @@ def assess(folder: RunFolder, *, n_tests: int, seed: int | None, rules_epoch: in
         n_tests: test epochs a goal.
         seed: root seed of the layouts; None takes the run's own, which gives what the run's own evaluation gave.
         rules_epoch: epoch whose rules are in force; None takes the last one learnt.
+        rig: shipped rig or a file to test on; None takes the run's own.
 
     Raises:
+        ConfigError: the rig's file is missing or wrong, or it is another arm's.
         RunFolderError: this is no run folder.
         CheckpointError: no checkpoint can be read.
     """
     manifest, resolved = folder.manifest(), folder.config()
+    if rig is not None:
+        resolved = with_rig(resolved, rig)
     state, _ = folder.checkpoints.newest()
     epoch = max(0, state["n_done"] - 1) if rules_epoch is None else rules_epoch
     n_goals, oracle = len(manifest.goals), rules_oracle(resolved)

@@ -122,6 +122,7 @@ def evaluate(
     rules_epoch: Annotated[
         int | None, typer.Option(min=0, help="Epoch whose rules are in force.  [default: the last one learnt]")
     ] = None,
+    rig: Annotated[str | None, typer.Option(help="Shipped rig or a file to test on.  [default: the run's]")] = None,
     *,
     json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
 ) -> None:
@@ -131,7 +132,7 @@ def evaluate(
     folder = RunFolder(run)
     goals = [goal.name for goal in folder.manifest().goals]
     with Console(stderr=True).status(f"testing {len(goals)} goals, {tests} epochs each"):
-        rows = assess(folder, n_tests=tests, seed=seed, rules_epoch=rules_epoch)
+        rows = assess(folder, n_tests=tests, seed=seed, rules_epoch=rules_epoch, rig=rig)
     if json:
         typer.echo(msgspec.json.encode({"goals": goals, "rows": rows}).decode())
     else:

@@ -3,7 +3,7 @@
 from config.resolved import Resolved
 from robot.bus import open_session
 from robot.bus.twin_link import RemoteResetter, RemoteTruth
-from robot.errors import NotEngagedError, RobotConfigError
+from robot.errors import RobotConfigError
 from robot.hal.protocols import Resetter, SceneTruth
 from robot.local_station import LocalStation, Perceives
 from robot.messages import PlantIdentity
@@ -22,9 +22,9 @@ class _LabWorld:
 
     @property
     def identity(self) -> PlantIdentity:
-        """Which plant the servo process found."""
-        if self._loop.identity is None:
-            raise NotEngagedError("servo process: expected connect() before its plant's identity is asked for")
+        """Which plant the servo process finds; it is started for that, and moves nothing."""
+        self._loop.connect()
+        assert self._loop.identity is not None, "connecting told it"
         return self._loop.identity
 
 

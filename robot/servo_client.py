@@ -37,8 +37,8 @@ from robot.tick_loop import Stride
 __all__ = ["ServoClient"]
 
 START_S, ENGAGE_S, ANSWER_S = 60.0, 20.0, 5.0
-STRIDE_SLACK_S = 1.0
-"""How much later than it should a time step may end before the process counts as hung."""
+STRIDE_SLACK_S = 5.0
+"""How much later than it should a time step may end before the process counts as hung: a refusal stops the arm."""
 CLOSE_S = 5.0
 
 
@@ -145,18 +145,20 @@ class ServoClient:
             raise NotEngagedError("servo process: expected one that runs, it has ended; connect and engage again")
         try:
             self._connection.send_bytes(self._encode(request))
-            if not self._connection.poll(timeout_s):
-                self._kill()
-                raise StaleStateError(
-                    f"servo process: expected an answer to {type(request).__name__} within {timeout_s:g} s, none came; "
-                    "it was killed, the arm's own watchdog stops the arm"
-                )
-            reply = self._decode(self._connection.recv_bytes())
+            is_answered = self._connection.poll(timeout_s)
+            raw = self._connection.recv_bytes() if is_answered else b""
         except (EOFError, OSError) as error:
             self._kill()
             raise WireError(
                 f"servo process: expected an answer, it has ended ({error}); the arm was stopped"
             ) from error
+        if not is_answered:
+            self._kill()
+            raise StaleStateError(
+                f"servo process: expected an answer to {type(request).__name__} within {timeout_s:g} s, none came; it "
+                "was killed, the arm's own watchdog stops the arm"
+            )
+        reply = self._decode(raw)
         if isinstance(reply, Failure):
             raise _error(reply)
         assert isinstance(reply, expected), f"{type(request).__name__} was answered by {type(reply).__name__}"

@@ -140,6 +140,7 @@ class TickLoop:
         now_ns = arm.clock.now_ns()
         try:
             state = self._read(now_ns)
+            now_ns = arm.clock.now_ns()  # on a wall clock the state read is newer than the tick's beginning
             command = ArmCommand(
                 stamp_ns=now_ns,
                 sequence=gate.next_sequence,

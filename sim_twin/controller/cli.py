@@ -22,6 +22,9 @@ def controller(
     scenario: Annotated[str, typer.Option("--scenario", "-s", help="A shipped scenario's name or a file.")] = "paper",
     seed: Annotated[int, typer.Option("--seed", min=0, help="Which table is drawn.")] = 0,
     powered: Annotated[bool, typer.Option("--powered/--unpowered", help="Begin with power on.")] = True,
+    bus: Annotated[
+        str, typer.Option("--bus", help="Zenoh endpoint for truth and resets, e.g. tcp/127.0.0.2:7447.")
+    ] = "",
     script: Annotated[Path | None, typer.Option("--script", help="URScript file to run at the start.")] = None,
 ) -> None:
     """Run a virtual UR controller until Ctrl-C; unmodified clients connect to it."""
@@ -39,6 +42,7 @@ def controller(
             is_powered=powered,
             is_any_host_allowed=allow_any,
             script=text,
+            bus=bus,
         )
         server = ControllerServer(setup)
         with server:

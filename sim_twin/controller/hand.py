@@ -2,6 +2,8 @@
 
 from collections.abc import Callable
 
+import msgspec
+
 from sim_twin.controller.wire import GripperMeasurement, GripperRequest
 from sim_twin.plant import HELD_GAP_M, STILL_M_S, TwinWorld
 
@@ -54,6 +56,12 @@ class Hand:
         elif self._status == ACTIVE:
             self._go()
         self._n_still = 0
+
+    def open(self) -> None:
+        """Stand open, as after a reset of the table; an active gripper stays active."""
+        self._request = msgspec.structs.replace(self._request, pos=0)
+        self._n_still, self._held = 0, MOVING
+        self._world.opening_goal_m = self._tool.stroke_m
 
     def measure(self) -> GripperMeasurement:
         """Return what the gripper reports."""

@@ -7,6 +7,7 @@ import msgspec
 import numpy as np
 
 from config.loader import resolve
+from robot.kinematics import Kinematics
 from sim_twin.controller.builtins import program_builtins
 from sim_twin.controller.compiling import Compiler, InlineCompiler, MakeBuiltins
 from sim_twin.controller.hand import Hand
@@ -76,6 +77,7 @@ class VirtualRobot:
         self.panel = Panel(self.machine, self.programs)
         self.disturb: Callable[[Measured], Measured] | None = None
         self.forced_inputs = 0
+        self._kinematics = Kinematics(world.arm)
         if is_powered:
             modes.robot = RobotMode.RUNNING
             self.machine.drive.engage()
@@ -103,6 +105,23 @@ class VirtualRobot:
         machine.n_standing = machine.n_standing + 1 if drive.is_standing else 0
         machine.io.digital_in = machine.world.table.read_inputs() | self.forced_inputs
         self.hand.tick()
+
+    def lay_out(self, *, seed: int, epoch: int, digital_out: int) -> None:
+        """Draw and place the table, the arm at its start, lids as the outputs say, the hand open (a reset).
+
+        Raises:
+            ValueError: a program runs, or the arm is under way: it would go on from somewhere else.
+        """
+        machine, drive = self.machine, self.machine.drive
+        if machine.modes.runtime is not RuntimeState.STOPPED or not drive.is_standing:
+            raise ValueError("expected no program and an arm at rest; stop the program first")
+        world = machine.world
+        layout = draw_layout(world.scenario, np.random.default_rng([seed, epoch]))
+        world.put(layout, self._kinematics.solve(layout.start_m, world.arm.home_rad), digital_out)
+        machine.io.digital_out = digital_out & BOX_BITS
+        if not drive.is_braked:
+            drive.engage()
+        self.hand.open()
 
     def close(self) -> None:
         """End programs and their connections."""

@@ -10,6 +10,7 @@ from typing import Self
 
 import msgspec
 
+from sim_twin.controller.bus_port import BusPort
 from sim_twin.controller.compiling import ThreadCompiler
 from sim_twin.controller.control_port import CONTROL, ControlPort
 from sim_twin.controller.faults import Faults
@@ -39,6 +40,8 @@ class Setup(msgspec.Struct, frozen=True, kw_only=True):
     is_any_host_allowed: bool = False
     script: str = ""
     """Text of a program to run at the start."""
+    bus: str = ""
+    """Zenoh endpoint to listen on: the twin's truth, and resets of its table."""
 
 
 def parse_version(text: str) -> ControllerVersion:
@@ -94,17 +97,20 @@ class ControllerServer:
         self.faults = Faults(robot, self.wires, self.ticks, seed=setup.seed)
         self._control = Reactor()
         self._n_ticks = 0
+        self._bus: BusPort | None = None
 
     def __enter__(self) -> Self:
         """Open the ports.
 
         Raises:
-            OSError: a port is taken.
+            OSError: a port is taken, or the bus's endpoint is.
         """
         try:
             self.wires.open(self.setup.host)
             if ip_address(self.setup.host).is_loopback:
                 self._control.listen(self.setup.host, CONTROL, ControlPort(self.faults))
+            if self.setup.bus:
+                self._bus = BusPort(self.robot, self.setup.bus)
         except OSError:
             self.close()
             raise
@@ -119,6 +125,9 @@ class ControllerServer:
 
     def close(self) -> None:
         """Shut the ports and end the programs; a second call does nothing."""
+        if self._bus is not None:
+            self._bus.close()
+            self._bus = None
         self._control.close()
         self.wires.close()
         self.robot.close()
@@ -136,6 +145,8 @@ class ControllerServer:
             while outbox:
                 self.wires.states.tell(outbox.popleft())
             self.wires.tick(self.robot.machine.drive.n_slices)
+            if self._bus is not None:
+                self._bus.tick(self.robot.machine.drive.n_slices)
         spent_s = perf_counter() - begun
         self.robot.machine.execution_s = spent_s
         self.ticks.add(spent_s)
