@@ -72,6 +72,11 @@ class ServoClient:
         self.identity: PlantIdentity | None = None
         self.is_in_contact = False
 
+    @property
+    def pid(self) -> int | None:
+        """The process's number, None while there is none."""
+        return None if self._process is None else self._process.pid
+
     def connect(self) -> None:
         """Start the process, where none runs, and let it acquire the arm. Moves nothing.
 
