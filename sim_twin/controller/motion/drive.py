@@ -65,6 +65,10 @@ def servo_lag_s(model: mujoco.MjModel, actuator: int, *, tick_s: float) -> float
     return damping / stiffness + float(model.actuator_delay[actuator]) + tick_s / 2.0
 
 
+FELT_S = 0.02
+"""Time constant of the forces that collisions and the force limit are judged by. A guess: UR publishes none."""
+
+
 class TwinDrive:
     """Owns a twin's world and moves its arm. Starts with brakes on and no power.
 
@@ -162,6 +166,7 @@ class TwinDrive:
         self._is_compliant = False
 
     def _seat(self) -> None:
+        self._felt_force_n, self._felt_nm = 0.0, np.zeros(6)
         q = self.world.data.qpos[:6].copy()
         self.world.data.ctrl[self._controls] = q
         self._expected = q
@@ -284,15 +289,19 @@ class TwinDrive:
         return self.core.tool_at(self.motions.setpoint.q_target)[:3, 3] if self.limits.planes else np.zeros(3)
 
     def _felt(self) -> Felt:
+        """What the limits are judged by. Forces are smoothed: a blow of a millisecond passes through no real sensor."""
         now = self.measured
+        share = SLICE_S / (SLICE_S + FELT_S)
+        self._felt_force_n += share * (float(np.linalg.norm(now.wrench[:3])) - self._felt_force_n)
+        self._felt_nm += share * (now.external_nm - self._felt_nm)
         return Felt(
             q_rad=now.q_rad,
             qd_rad_s=now.qd_rad_s,
             q_expected_rad=self._expected,
             tool_m=now.tcp_pose[:3],
             tool_speed_m_s=float(np.linalg.norm(now.tcp_speed[:3])),
-            force_n=float(np.linalg.norm(now.wrench[:3])),
-            external_nm=now.external_nm,
+            force_n=self._felt_force_n,
+            external_nm=self._felt_nm,
         )
 
     def _read(self) -> Measured:
