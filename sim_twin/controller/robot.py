@@ -14,6 +14,7 @@ from sim_twin.controller.hand import Hand
 from sim_twin.controller.io import BOX_BITS
 from sim_twin.controller.machine import Machine
 from sim_twin.controller.motion import SLICE_S, Breach, Measured
+from sim_twin.controller.motion.limits import Cause
 from sim_twin.controller.outputs import make_outputs
 from sim_twin.controller.panel import Panel
 from sim_twin.controller.program import Programs
@@ -139,9 +140,10 @@ class VirtualRobot:
 
     def _stop_for(self, breach: Breach) -> None:
         cause = breach.cause
-        is_stopped = self.machine.modes.safety_status_bits & (_VIOLATION_BIT if cause.is_violation else _PROTECTIVE_BIT)
-        if is_stopped:
-            # What presses goes on pressing: one blow is one stop.
+        bits = self.machine.modes.safety_status_bits
+        is_pressing_still = cause is Cause.FORCE_VIOLATION and bits & _PROTECTIVE_BIT
+        if is_pressing_still or bits & (_VIOLATION_BIT if cause.is_violation else _PROTECTIVE_BIT):
+            # What presses goes on pressing while the arm comes to rest: one blow is one stop.
             return
         argument = cause.value[1] if breach.joint is None else breach.joint
         self.machine.journal.error(cause.code, argument, breach.text, is_violation=cause.is_violation)
