@@ -14,6 +14,7 @@ from config.resolved import Resolved
 from robot.bench import BenchReport, BenchResult, bench_report
 from robot.local_station import LocalStation
 from robot.messages import Heading
+from robot.operated import OperatedStation
 from robot.rigs import build_operator, build_station
 from sim_twin.names import on_table
 from sim_twin.pilot import Pilot
@@ -54,8 +55,13 @@ class _Stopwatch:
         self.seconds += perf_counter() - start
 
 
-def _wander(station: LocalStation, n_decisions: int, rng: np.random.Generator) -> None:
-    """Random headings and descents, a new table every 60 decisions, as an exploring learner makes them."""
+def _operated(resolved: Resolved, station: LocalStation) -> OperatedStation:
+    """Return a station that goes on after a latch, as a learner's does."""
+    return OperatedStation(station, build_operator(resolved.rig))
+
+
+def _wander(station: OperatedStation, n_decisions: int, rng: np.random.Generator) -> None:
+    """Random headings and descents, a new table every 60 decisions or after a latch, as an exploring learner's are."""
     low, travel = station.spec.heights_m
     heading = 0.0
     for k in range(n_decisions):
@@ -64,14 +70,17 @@ def _wander(station: LocalStation, n_decisions: int, rng: np.random.Generator) -
         if k % 20 == 0:
             heading = rng.uniform(-math.pi, math.pi)
         is_down = k % 60 >= 40
-        station.step(
+        came = station.step(
             Heading(heading_rad=heading, distance_m=0.0 if is_down else 0.022, height_m=low if is_down else travel)
         )
+        if came.is_void:
+            station.reset(seed=int(rng.integers(1 << 30)), epoch=0)
 
 
 def _measure_stack(resolved: Resolved, n_decisions: int) -> tuple[float, float]:
     """Return seconds a decision, whole and physics alone, in one run."""
-    station, plant = open_twin(resolved)
+    made, plant = open_twin(resolved)
+    station = _operated(resolved, made)
     rng = np.random.default_rng(0)
     _wander(station, 60, rng)
     watch = _Stopwatch(plant.world)
@@ -95,7 +104,8 @@ def _measure_physics(resolved: Resolved, n_steps: int) -> float:
 
 def _work(start_at: float, seconds: float) -> int:
     """Make decisions from a common instant on for a span; return how many. Runs in a process of its own."""
-    station, _ = open_twin(resolve())
+    resolved = resolve()
+    station = _operated(resolved, open_twin(resolved)[0])
     rng = np.random.default_rng(0)
     _wander(station, 60, rng)
     sleep(max(0.0, start_at - perf_counter()))
