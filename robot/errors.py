@@ -1,6 +1,7 @@
 """Errors of the robot package, in families by who must act."""
 
 __all__ = [
+    "ArmRefusedError",
     "BugError",
     "NotEngagedError",
     "RobotConfigError",
@@ -33,6 +34,10 @@ class SafetyError(RobotError):
 
 class NotEngagedError(SafetyError):
     """Motion was asked for while the station was not engaged."""
+
+
+class ArmRefusedError(SafetyError, WireError):
+    """The arm's controller did not do what it was told, or is not in a state to be told."""
 
 
 class BugError(RobotError, AssertionError):

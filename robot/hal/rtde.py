@@ -16,14 +16,13 @@ from rtde_io import RTDEIOInterface
 from rtde_receive import RTDEReceiveInterface
 
 from config.arm import ArmConfig
-from robot.errors import NotEngagedError, StaleStateError, WireError
+from robot.errors import ArmRefusedError, NotEngagedError, RobotError, StaleStateError, WireError
 from robot.geometry import quat_of_rotation_vector
 from robot.hal.robotiq import GripScale, RobotiqGripper
 from robot.hal.rtde_clock import RtdeClock
 from robot.hal.ur_checks import check_facts, check_pose
 from robot.hal.ur_primary import read_facts
 from robot.hal.ur_state import (
-    ArmRefusedError,
     Runtime,
     UrStatus,
     check_ready,
@@ -116,16 +115,13 @@ class RtdeArm:
             return
         receive, dashboard = self._reading()
         check_ready(self.status(), is_remote=_is_remote(dashboard))
-        control = self._take_control()
-        self._prove_watchdog(control)
-        self._control = control = self._take_control()
-        self._set_up(control, receive)
-        self._outputs = RTDEIOInterface(self.address)
-        self._put_bits = receive.getActualDigitalOutputBits() & _ALL_BITS
-        if not self._gripper.is_active:
-            self._gripper.activate()
-        # From here on somebody must write: a command every 100 ms at least, or the program ends.
-        self._require(control.setWatchdog(WATCHDOG_HZ), "setWatchdog")
+        self._prove_watchdog(self._take_control())
+        self._control = self._take_control()
+        try:
+            self._set_up(self._control, receive)
+        except (RobotError, RuntimeError):
+            self._drop_control()  # an arm that was set up by half is nobody's: the next engage begins anew
+            raise
 
     # ------------------------------------------------------------------------------------------------ read and write
 
@@ -257,7 +253,7 @@ class RtdeArm:
         )
 
     def _set_up(self, control: RTDEControlInterface, receive: RTDEReceiveInterface) -> None:
-        """Set payload and tool centre point, and read both back."""
+        """Set payload and tool centre point, read both back, open the outputs and the hand, arm the watchdog last."""
         tool = self._arm.tool
         tcp = [*tool.tcp_m, 0.0, 0.0, 0.0]
         self._require(control.setPayload(tool.mass_kg, list(tool.com_m)), "setPayload")
@@ -269,17 +265,24 @@ class RtdeArm:
             if monotonic_ns() > deadline_ns:
                 raise ArmRefusedError(f"expected payload {tool.mass_kg} kg, the controller says {receive.getPayload()}")
             self.clock.wait_tick()
+        self._outputs = RTDEIOInterface(self.address)
+        self._put_bits = receive.getActualDigitalOutputBits() & _ALL_BITS
+        if not self._gripper.is_active:
+            self._gripper.activate()
+        # From here on somebody must write: a command every 100 ms at least, or the program ends.
+        self._require(control.setWatchdog(WATCHDOG_HZ), "setWatchdog")
 
     def _drop_control(self) -> None:
         """End the program and forget its client: it must never get the chance to go on by itself."""
         control, self._control = self._control, None
         outputs, self._outputs = self._outputs, None
-        with suppress(RuntimeError):
-            if control is not None:
+        if control is not None:
+            with suppress(RuntimeError):
                 control.stopScript()
+            with suppress(RuntimeError):
                 control.disconnect()
-        with suppress(RuntimeError):
-            if outputs is not None:
+        if outputs is not None:
+            with suppress(RuntimeError):
                 outputs.disconnect()
 
     def _put_outputs(self, digital_out: int) -> None:
@@ -310,7 +313,7 @@ class RtdeArm:
             try:
                 state = self.read()
                 self.clock.wait_tick()
-            except WireError:
+            except (WireError, RuntimeError):  # the client throws the latter where it has no state
                 return False
             if max(abs(v) for v in state.qd_rad_s) < STILL_RAD_S:
                 return True

@@ -8,11 +8,10 @@ import socket
 
 import msgspec
 
-from robot.errors import RobotConfigError, SafetyError, WireError
+from robot.errors import ArmRefusedError, RobotConfigError, WireError
 from robot.messages import ArmMode, PlantKind
 
 __all__ = [
-    "ArmRefusedError",
     "Runtime",
     "UrStatus",
     "check_ready",
@@ -38,10 +37,6 @@ _SAFETY_BITS = (
 )  # fmt: skip
 _EMERGENCY = 1 << 5 | 1 << 6 | 1 << 7
 _STOPPED = 1 << 2 | 1 << 3 | 1 << 4 | 1 << 8 | 1 << 9 | 1 << 10
-
-
-class ArmRefusedError(SafetyError, WireError):
-    """The controller did not do what it was told; the client says False and nothing more."""
 
 
 class Runtime:

@@ -3,9 +3,8 @@
 import msgspec
 import pytest
 
-from robot.errors import RobotConfigError, WireError
+from robot.errors import ArmRefusedError, RobotConfigError, WireError
 from robot.hal.ur_state import (
-    ArmRefusedError,
     Runtime,
     UrStatus,
     check_ready,
