@@ -67,7 +67,10 @@ class SubgoalSelection(Section, frozen=True, kw_only=True):
     literal_cost: NonNegative = 1.2
     """Prior of a conjunction is exp(-cost * literals)."""
     hazard: Share = 0.01
-    """Chance per attempt that the preconditions were drawn anew: the change detector."""
+    """Chance per attempt that the preconditions have changed: the change detector."""
+    local_change: Share = 0.5
+    """Share of those changes that are of one literal (one more, one fewer, turned round, exchanged); the others draw
+    the preconditions anew."""
     false_positive: Error = 0.02
     """Chance that a goal is achieved although its preconditions do not hold."""
     blocked_error: Error = 0.05

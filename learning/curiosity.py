@@ -5,7 +5,7 @@ blocked a goal (it presses neither), nor that something is needed no longer (it 
 shows, if the epoch's goal can still be achieved after it.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -14,7 +14,7 @@ from config.learning import SubgoalSelection
 from learning.graph import Finding, Graph
 from learning.preconditions import START, Needs, Situation
 
-__all__ = ["Curiosity", "Probe", "most_hopeful_step", "random_walks"]
+__all__ = ["Curiosity", "Probe", "Spot", "most_hopeful_step", "random_walks"]
 
 N_WALKS = 6
 FADE = 0.998
@@ -27,8 +27,10 @@ SURPRISE = 0.1
 """A result that had been given less than this chance is suspect."""
 
 
-_Spot = tuple[int, Situation]
+Spot = tuple[int, Situation]
 """A goal, and a situation in which it is tried."""
+
+NOTHING: Mapping[Spot, float] = {}
 
 
 class Probe(NamedTuple):
@@ -64,15 +66,25 @@ def random_walks(
 
 
 def most_hopeful_step(
-    goal: int, start: Situation, graph: Graph, *, n_walks: int, length: int, rng: np.random.Generator
-) -> int:
+    goal: int, start: Situation, graph: Graph, *, n_walks: int, length: int, rng: np.random.Generator,
+    failures: Mapping[Spot, float] = NOTHING,
+) -> int:  # fmt: skip
     """Return the first step towards where a goal has the best chance per trial, the goal itself if that is here.
 
     For a goal of which it is not known what it needs: what is cheap to try comes first, and each failure moves on.
+
+    Args:
+        goal: the wanted goal.
+        start: the situation to start from.
+        graph: what is believed.
+        n_walks: random walks over what is believed allowed.
+        length: most steps of each.
+        rng: draws the walks.
+        failures: how often it failed of late, by situation; where it just failed it hardly fares better.
     """
     best, best_value = goal, 0.0
     for steps, here in random_walks(start, graph, n_walks=n_walks, length=length, rng=rng):
-        value = graph.beliefs[goal].predict_allowed(here) / (len(steps) + 1)
+        value = graph.beliefs[goal].predict_success(here) / (len(steps) + 1) / (1.0 + failures.get((goal, here), 0.0))
         if value > best_value and not (steps and goal in steps):
             best, best_value = steps[0] if steps else goal, value
     return best
@@ -85,10 +97,12 @@ class Curiosity:
         self._config = config
         self._rng = rng
         self._probe: Probe | None = None
-        self._tries: dict[_Spot, float] = {}
+        self._tries: dict[Spot, float] = {}
         """How often probed; what stays doubtful though probed gets boring."""
-        self._suspects: set[_Spot] = set()
+        self._suspects: set[Spot] = set()
         """Where the last result was a surprise."""
+        self._old_ways: dict[int, Needs] = {}
+        """What goals were believed to need until it was revised, to be tried once more."""
         self._interest = 1.0
         """Share of the configured curiosity; fruitless probes tire it, surprises wake it."""
 
@@ -106,6 +120,7 @@ class Curiosity:
         at = (finding.goal, finding.situation)
         if finding.is_revised:
             self._tries = {key: n for key, n in self._tries.items() if key[0] != finding.goal}
+            self._old_ways[finding.goal] = finding.believed
         if finding.expected < SURPRISE:
             self._suspects.add(at)
             self._interest = min(1.0, self._interest + WAKING)
@@ -121,7 +136,7 @@ class Curiosity:
         if chance < self._config.retest:
             probe = self._retest(graph)
         elif chance < self._config.retest + self._config.curiosity * self._interest:
-            probe = self._most_doubtful(goal, graph)
+            probe = self._old_way(goal, graph) or self._most_doubtful(goal, graph)
         else:
             probe = None
         if probe is None or not self._fits(probe, goal, graph):
@@ -130,6 +145,22 @@ class Curiosity:
         at = (probe.steps[-1], probe.situation)
         self._tries[at] = self._tries.get(at, 0.0) + graph.skill(probe.steps[-1])
         return probe
+
+    def _old_way(self, goal: int, graph: Graph) -> Probe | None:
+        """Return a probe of a goal in the way that was believed in until lately, or None.
+
+        A goal that no longer needs what it needed may need its contrary: where a success without it came first, nothing
+        speaks for that, and nobody would provide again what seems of no use.
+        """
+        for tried, believed in sorted(self._old_ways.items()):
+            steps = graph.plan(tried, START, lambda i, g=tried, b=believed: b if i == g else graph.most_probable(i))
+            probe = Probe(steps, graph.follow(steps[:-1])) if steps else None
+            if probe is None or not graph.most_probable(tried).allow(probe.situation):
+                del self._old_ways[tried]
+            elif self._fits(probe, goal, graph):
+                del self._old_ways[tried]
+                return probe
+        return None
 
     def _most_doubtful(self, goal: int, graph: Graph) -> Probe | None:
         """Return the probe of most doubt per trial that is met on random walks, or None where there is little doubt."""
@@ -188,6 +219,7 @@ class Curiosity:
             "interest": self._interest,
             "probe": None if self._probe is None else [list(self._probe.steps), list(self._probe.situation)],
             "tries": [[goal, list(situation), n] for (goal, situation), n in self._tries.items()],
+            "old_ways": [[goal, list(needs)] for goal, needs in sorted(self._old_ways.items())],
             "suspects": [[goal, list(situation)] for goal, situation in sorted(self._suspects)],
         }
 
@@ -197,4 +229,5 @@ class Curiosity:
         probe = state["probe"]
         self._probe = None if probe is None else Probe(tuple(probe[0]), Situation(*probe[1]))
         self._tries = {(goal, Situation(*situation)): n for goal, situation, n in state["tries"]}
+        self._old_ways = {goal: Needs(*needs) for goal, needs in state["old_ways"]}
         self._suspects = {(goal, Situation(*situation)) for goal, situation in state["suspects"]}

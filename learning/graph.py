@@ -12,7 +12,7 @@ from learning.interfaces import Attempt, TrialOutcome
 from learning.planning import Effort, cheapest_plan, relevant_goals
 from learning.preconditions import START, Belief, Evidence, Kind, Needs, Situation, mask
 
-__all__ = ["Finding", "Graph"]
+__all__ = ["Finding", "Graph", "situation_of"]
 
 LEAST_SKILL = 0.05
 KNOWN = 0.5
@@ -35,8 +35,10 @@ class Finding(msgspec.Struct, frozen=True, kw_only=True):
     """Before the trial."""
     expected: float
     """Chance that had been given to the result that came."""
+    believed: Needs
+    """The goal's most probable needs before."""
     is_revised: bool
-    """The goal's most probable needs changed."""
+    """They are others now."""
 
 
 class Graph:
@@ -89,14 +91,16 @@ class Graph:
         evidence = Evidence(epoch=attempt.epoch, kind=kind, readings=_readings(goal, attempt, kind))
         weight = self._weight(evidence, is_repeated=self._last[goal] == evidence)
         if kind is not Kind.MISSED:
-            belief.mix_with_prior(self._config.hazard)
+            belief.expect_change(self._config.hazard, local=self._config.local_change)
             self._log[goal].append(evidence)
         self._last[goal] = evidence
         expected = belief.update(evidence, block_hit=self._block_hit(attempt.skill), weight=weight)
         is_revised = self.most_probable(goal) != before
         if is_revised:
             self._changed_epoch[goal] = attempt.epoch
-        return Finding(goal=goal, situation=_situation(attempt), expected=expected, is_revised=is_revised)
+        return Finding(
+            goal=goal, situation=situation_of(attempt), expected=expected, believed=before, is_revised=is_revised
+        )
 
     def _weight(self, evidence: Evidence, *, is_repeated: bool) -> float:
         """Return how much evidence counts for.
@@ -232,7 +236,8 @@ def _plain(evidence: Evidence) -> Any:  # noqa: ANN401 - a JSON tree
     return msgspec.json.decode(msgspec.json.encode(evidence))
 
 
-def _situation(attempt: Attempt) -> Situation:
+def situation_of(attempt: Attempt) -> Situation:
+    """Return the situation before a trial."""
     latched = mask(attempt.state)
     return Situation(latched if attempt.holds is None else latched & mask(attempt.holds), latched)
 
@@ -246,7 +251,7 @@ def _readings(goal: int, attempt: Attempt, kind: Kind) -> tuple[Situation, ...]:
     """
     before = mask(attempt.state)
     after = before | mask(attempt.state_after) & ~(1 << goal)
-    lost = before & ~_situation(attempt).holds
+    lost = before & ~situation_of(attempt).holds
     if attempt.holds_after is not None and kind is not Kind.ACHIEVED:
         lost |= before & ~mask(attempt.holds_after)
     readings = {Situation(latched & ~gone, latched) for latched in (before, after) for gone in (0, lost)}

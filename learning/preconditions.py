@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import msgspec
 import numpy as np
 
-__all__ = ["START", "Belief", "Evidence", "Kind", "Needs", "Situation", "conjunctions", "mask"]
+__all__ = ["START", "Belief", "Evidence", "Kind", "Needs", "Situation", "conjunctions", "mask", "one_change_apart"]
 
 
 class Situation(NamedTuple):
@@ -69,6 +69,21 @@ def mask(state: Sequence[bool]) -> int:
     return sum(1 << i for i, is_on in enumerate(state) if is_on)
 
 
+def one_change_apart(needs: Needs, n_goals: int, goal: int, max_literals: int) -> Iterator[Needs]:
+    """Yield what becomes of a conjunction by one change: a literal more, one fewer, one turned round, one exchanged."""
+    others = [1 << i for i in range(n_goals) if i != goal]
+    free = [bit for bit in others if not (needs.on | needs.off) & bit]
+    more = [way for bit in free for way in (Needs(bit, 0), Needs(0, bit))]
+    if (needs.on | needs.off).bit_count() < max_literals:
+        yield from (Needs(needs.on | way.on, needs.off | way.off) for way in more)
+    for bit in others:
+        if (needs.on | needs.off) & bit:
+            without = Needs(needs.on & ~bit, needs.off & ~bit)
+            yield without
+            yield Needs(needs.on ^ bit, needs.off ^ bit)
+            yield from (Needs(without.on | way.on, without.off | way.off) for way in more)
+
+
 def conjunctions(n_goals: int, goal: int, max_literals: int) -> Iterator[Needs]:
     """Yield every conjunction of up to so many literals on goals other than this one, fewest literals first."""
     others = [i for i in range(n_goals) if i != goal]
@@ -82,12 +97,14 @@ def conjunctions(n_goals: int, goal: int, max_literals: int) -> Iterator[Needs]:
 class Belief:
     """The posterior of one goal, Bayes' rule with a change hazard.
 
-    The prior of a conjunction is exp(-cost · literals), normalised. Before each update the posterior is mixed with the
-    prior at the hazard: so often the needs are taken to have been drawn anew since the last attempt.
+    The prior of a conjunction is exp(-cost · literals), normalised. Before an update the needs are taken to have
+    changed since the last attempt with a small chance, the hazard: some of those changes draw them anew from the prior,
+    the others change one literal of what was believed. Who moves a wire on a table leaves the rest as it was.
 
     An attempt fails for want of skill or for want of what is needed, and only together do they explain a record. So
     each conjunction has a skill of its own: the share of hits, Beta(1, 1) and forgetting, where it allowed the goal. If
-    every miss fell where a conjunction says no, that one needs no clumsy expert to explain them, and gains.
+    every miss fell where a conjunction says no, that one needs no clumsy expert to explain them, and gains. A change of
+    one literal takes the record along, for the expert is the same; what is drawn anew begins with an empty one.
 
     A miss speaks only for what must be on: without the thing that is to be put somewhere there may be no way to the
     place. What must be off shows itself at the place, where the attempt is blocked; misses with something else in the
@@ -103,6 +120,7 @@ class Belief:
         n_literals = np.array([(c.on | c.off).bit_count() for c in needs])
         weights = np.exp(-literal_cost * n_literals)
         self._prior = weights / weights.sum()
+        self._changes, self._n_changes = _changes(needs, n_goals, goal, max_literals)  # (h, most), (h,)
         self._n_goals = n_goals
         self._false_positive = false_positive
         self._hits = np.zeros(len(needs))  # (h,)
@@ -126,15 +144,32 @@ class Belief:
         self.confidence = float(probabilities[best])
         """Its probability."""
 
-    def mix_with_prior(self, hazard: float) -> None:
-        """Take the needs to have been drawn anew with this chance."""
-        self._believe((1.0 - hazard) * self.probabilities + hazard * self._prior)
+    def expect_change(self, hazard: float, *, local: float = 0.0) -> None:
+        """Take the needs to have changed.
+
+        Args:
+            hazard: chance that they did.
+            local: share of the changes that are of one literal; the others draw from the prior.
+        """
+        leaving = hazard * local * self.probabilities / self._n_changes  # (h,)
+        changed = self._arriving(leaving)
+        kept = (1.0 - hazard) * self.probabilities
+        mixed = kept + changed + hazard * (1.0 - local) * self._prior
+        for record in (self._hits, self._misses):
+            brought = kept * record + self._arriving(leaving * record)
+            np.divide(brought, mixed, out=record, where=mixed > 0.0)
+        self._believe(mixed / mixed.sum())
+
+    def _arriving(self, leaving: np.ndarray) -> np.ndarray:
+        """Return what comes to each conjunction from those one change apart, which each send so much.  (h,) -> (h,)"""
+        return np.append(leaving, 0.0)[self._changes].sum(axis=1)
 
     def update(self, evidence: Evidence, *, block_hit: float, weight: float = 1.0) -> float:
         """Apply Bayes' rule to one attempt and return the chance that had been given to its result.
 
-        Where the situation can be read in more than one way, success is likely if any reading allows the goal (the
-        trial goes on until it does); failure is averaged over the readings.
+        Where the situation can be read in more than one way, failure is averaged over the readings. Success is likely
+        if what was on at any time of the trial allows the goal (the trial goes on until it does), averaged over
+        whether what was dropped counts as on.
 
         Args:
             evidence: the attempt.
@@ -143,10 +178,11 @@ class Belief:
         """
         permits = self._provides if evidence.kind is Kind.MISSED else self.allows
         allowed = np.stack([permits(situation) for situation in evidence.readings])  # (readings, h)
+        ever_allowed = _ever(allowed, evidence.readings)  # (1 or 2, h)
         fp, chance = self._false_positive, (self._hits + 1.0) / (self._hits + self._misses + 2.0)  # (), (h,)
         match evidence.kind:
             case Kind.ACHIEVED:
-                factors = np.where(allowed.any(axis=0), np.maximum(chance, fp), fp)
+                factors = np.where(ever_allowed, np.maximum(chance, fp), fp).mean(axis=0)
             case Kind.BLOCKED:
                 factors = np.where(allowed, 1.0 - block_hit, 1.0 - fp).mean(axis=0)
             case Kind.MISSED:
@@ -154,19 +190,26 @@ class Belief:
         expected = float(self.probabilities @ factors)
         posterior = self.probabilities * factors**weight
         self._believe(posterior / posterior.sum())
-        self._record(evidence.kind, allowed, weight)
+        self._record(evidence.kind, ever_allowed.mean(axis=0), weight)
         return expected
 
     def _record(self, kind: Kind, allowed: np.ndarray, weight: float) -> None:
-        """Count a hit or a miss for every conjunction that allowed the goal. A block says nothing of the skill."""
+        """Count a hit or a miss for every conjunction that allowed the goal. A block says nothing of the skill.
+
+        Args:
+            kind: how the attempt ended.
+            allowed: chance that each conjunction allowed it.  (h,)
+            weight: what a miss counts for.
+        """
         if kind is Kind.BLOCKED:
             return
-        counted = allowed.any(axis=0) * (1.0 if kind is Kind.ACHIEVED else weight)  # (h,)
-        is_counted = counted > 0.0
-        for record, is_this in ((self._hits, kind is Kind.ACHIEVED), (self._misses, kind is Kind.MISSED)):
-            record[is_counted] *= FORGET
-            if is_this:
-                record += counted
+        is_counted = allowed > 0.0
+        self._hits[is_counted] *= FORGET
+        self._misses[is_counted] *= FORGET
+        if kind is Kind.ACHIEVED:
+            self._hits += allowed
+        else:
+            self._misses += weight * allowed
 
     def sample(self, rng: np.random.Generator) -> Needs:
         """Draw a conjunction from the posterior."""
@@ -176,6 +219,11 @@ class Belief:
     def predict_allowed(self, situation: Situation) -> float:
         """Return the probability that the goal is allowed in a situation."""
         return float(self.probabilities @ self.allows(situation))
+
+    def predict_success(self, situation: Situation) -> float:
+        """Return the chance of success in a situation: that the goal is allowed, and the skill where it is."""
+        chance = (self._hits + 1.0) / (self._hits + self._misses + 2.0)
+        return float(self.probabilities @ (self.allows(situation) * chance))
 
     def marginals(self) -> tuple[tuple[float, float], ...]:
         """Return for each goal the probability that it must be on, and that it must be off."""
@@ -198,3 +246,24 @@ class Belief:
         """Restore bit for bit."""
         self._believe(np.array(state["probabilities"], dtype=float))
         self._hits, self._misses = np.array(state["hits"], dtype=float), np.array(state["misses"], dtype=float)
+
+
+def _changes(needs: Sequence[Needs], n_goals: int, goal: int, max_literals: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return the indices of all conjunctions one change apart from each, padded with their number, and how many."""
+    index_of = {conjunction: i for i, conjunction in enumerate(needs)}
+    apart = [[index_of[n] for n in one_change_apart(c, n_goals, goal, max_literals)] for c in needs]
+    most = max(1, max(map(len, apart)))
+    padded = np.array([row + [len(needs)] * (most - len(row)) for row in apart], dtype=np.int64)
+    return padded, np.array([max(1, len(row)) for row in apart])
+
+
+def _ever(allowed: np.ndarray, readings: Sequence[Situation]) -> np.ndarray:
+    """Return what was allowed at any time of a trial, in a row for each way to read what was dropped.
+
+    Args:
+        allowed: by reading.  (readings, h)
+        readings: the situations; where what was dropped counts as on, all that is latched holds.
+    """
+    counts_as_on = np.array([reading.holds == reading.latched for reading in readings])
+    rows = [allowed[part].any(axis=0) for part in (counts_as_on, ~counts_as_on) if part.any()]
+    return np.stack(rows)

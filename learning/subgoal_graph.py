@@ -12,15 +12,18 @@ from typing import Any
 import numpy as np
 
 from config.learning import SubgoalSelection
-from learning.curiosity import Curiosity, most_hopeful_step
-from learning.graph import Graph
-from learning.interfaces import Attempt, GoalState
+from learning.curiosity import Curiosity, Spot, most_hopeful_step
+from learning.graph import Graph, situation_of
+from learning.interfaces import Attempt, GoalState, TrialOutcome
 from learning.preconditions import Situation, mask
 
 __all__ = ["GraphSelector"]
 
 N_WALKS = 20
 WALK = 6
+FRESH = 0.85
+"""How much of the memory of failures is left after each later trial."""
+FORGOTTEN = 0.01
 N_DRAWS = 6
 """Draws tried before a goal counts as out of reach in this goal-state."""
 
@@ -32,6 +35,8 @@ class GraphSelector:
         self._rng = rng
         self.graph = Graph(n_goals=n_goals, config=config)
         self._curiosity = Curiosity(config=config, rng=rng)
+        self._failures: dict[Spot, float] = {}
+        """How often a goal failed in a situation, of late."""
         self._changed: tuple[int, ...] = ()
 
     def select(
@@ -59,7 +64,9 @@ class GraphSelector:
         if step is not None:
             return step
         if not self.graph.is_known(goal, here):
-            return most_hopeful_step(goal, here, self.graph, n_walks=N_WALKS, length=WALK, rng=self._rng)
+            return most_hopeful_step(
+                goal, here, self.graph, n_walks=N_WALKS, length=WALK, rng=self._rng, failures=self._failures
+            )
         needs_of = self.graph.draw(self._rng)
         for _ in range(N_DRAWS):
             plan = self.graph.plan(goal, here, needs_of)
@@ -73,10 +80,17 @@ class GraphSelector:
     def update(self, attempt: Attempt) -> None:
         """Learn from one trial. Void attempts change nothing."""
         findings = self.graph.learn(attempt)
+        self._remember_failure(attempt)
         for finding in findings:
             self._curiosity.take_in(finding)
         revised = {i for finding in findings if finding.is_revised for i in self.graph.dependents(finding.goal)}
         self._changed = tuple(sorted(revised))
+
+    def _remember_failure(self, attempt: Attempt) -> None:
+        self._failures = {spot: FRESH * n for spot, n in self._failures.items() if n > FORGOTTEN}
+        if attempt.outcome in (TrialOutcome.BLOCKED, TrialOutcome.NOT_REACHED):
+            at = (attempt.subgoal, situation_of(attempt))
+            self._failures[at] = self._failures.get(at, 0.0) + 1.0
 
     def changed_goals(self) -> tuple[int, ...]:
         """Return the goals for which what they need, directly or not, was revised by the last update."""
@@ -91,6 +105,7 @@ class GraphSelector:
         return {
             "graph": self.graph.state_dict(),
             "curiosity": self._curiosity.state_dict(),
+            "failures": [[goal, list(situation), n] for (goal, situation), n in self._failures.items()],
             "changed": list(self._changed),
             "rng": self._rng.bit_generator.state,
         }
@@ -99,5 +114,6 @@ class GraphSelector:
         """Restore bit for bit."""
         self.graph.load_state_dict(state["graph"])
         self._curiosity.load_state_dict(state["curiosity"])
+        self._failures = {(goal, Situation(*situation)): n for goal, situation, n in state["failures"]}
         self._changed = tuple(state["changed"])
         self._rng.bit_generator.state = state["rng"]

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from learning.preconditions import START, Belief, Evidence, Kind, Needs, Situation, conjunctions, mask
+from learning.preconditions import START, Belief, Evidence, Kind, Needs, Situation, conjunctions, mask, one_change_apart
 
 ACHIEVED, BLOCKED, MISSED = Kind.ACHIEVED, Kind.BLOCKED, Kind.MISSED
 SURE = 0.95
@@ -121,8 +121,46 @@ def test_the_hazard_mixes_with_the_prior():
     prior = b.probabilities.copy()
     b.update(seen(ACHIEVED, state(0)), block_hit=SURE)
     sharp = b.probabilities.copy()
-    b.mix_with_prior(0.25)
+    b.expect_change(0.25)
     assert b.probabilities == pytest.approx(0.75 * sharp + 0.25 * prior)
+
+
+def test_one_change_adds_removes_turns_round_or_exchanges_a_literal():
+    # Goals 0 and 1 may be literals of goal 2.
+    assert set(one_change_apart(Needs(0b01, 0), 3, 2, 2)) == {
+        Needs(0, 0), Needs(0, 0b01), Needs(0b10, 0), Needs(0, 0b10), Needs(0b11, 0), Needs(0b01, 0b10),
+    }  # fmt: skip
+    assert set(one_change_apart(Needs(0, 0), 3, 2, 2)) == set(conjunctions(3, 2, 1)) - {Needs(0, 0)}
+    assert all((n.on | n.off).bit_count() <= 1 for n in one_change_apart(Needs(0b01, 0), 3, 2, 1))
+
+
+def test_what_is_one_change_apart_is_so_both_ways():
+    every = list(conjunctions(4, 3, 2))
+    apart = {c: set(one_change_apart(c, 4, 3, 2)) for c in every}
+    assert all(len(list(one_change_apart(c, 4, 3, 2))) == len(apart[c]) for c in every)
+    assert all((a in apart[b]) == (b in apart[a]) and a not in apart[a] for a in every for b in every)
+
+
+def test_a_change_of_one_literal_by_hand_takes_the_record_of_skill_along():
+    # Hypotheses {}, {0 on}, {0 off}, each one change from the two others.
+    b = belief(n_goals=2, goal=1, max_literals=1, literal_cost=0.0)
+    b.update(seen(ACHIEVED, state(0)), block_hit=SURE)
+    before = b.probabilities.copy()  # (0.5, 0.5, 0.02) / 1.02, a hit for the first two.
+    b.expect_change(0.1, local=1.0)
+    after = 0.9 * before + 0.1 * (1.0 - before) / 2.0
+    assert b.probabilities == pytest.approx(after)
+    hits = np.array([0.9 * before[0] + 0.05 * before[1], 0.9 * before[1] + 0.05 * before[0], 0.05 * before[:2].sum()])
+    chance = (hits / after + 1.0) / (hits / after + 2.0)
+    assert b.predict_success(state(0)) == pytest.approx(float(after[:2] @ chance[:2]))
+    assert b.predict_success(START) == pytest.approx(float(after[[0, 2]] @ chance[[0, 2]]))
+
+
+def test_what_was_dropped_counts_as_on_in_half_of_a_success():
+    # Goal 0 was achieved and lost when goal 1 came about: {0 on} explains it only if what was dropped counts as on.
+    b = belief(n_goals=2, goal=1, max_literals=1, literal_cost=0.0)
+    b.update(seen(ACHIEVED, Situation(0, 1), state(0)), block_hit=SURE)
+    weights = np.array([0.5, (0.5 + 0.02) / 2.0, 0.02])
+    assert b.probabilities == pytest.approx(weights / weights.sum())
 
 
 def test_draws_follow_the_posterior():
@@ -136,7 +174,7 @@ def test_draws_follow_the_posterior():
 def test_a_belief_survives_ten_thousand_contrary_surprises_without_losing_its_sum():
     b = belief()
     for i in range(10_000):
-        b.mix_with_prior(0.0)
+        b.expect_change(0.0)
         b.update(seen(ACHIEVED if i % 2 else BLOCKED, START), block_hit=SURE)
     assert np.isfinite(b.probabilities).all()
     assert b.probabilities.sum() == pytest.approx(1.0)

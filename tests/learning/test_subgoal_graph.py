@@ -8,7 +8,7 @@ import pytest
 from config.learning import SubgoalSelection
 from learning.graph import Graph
 from learning.interfaces import Attempt, TrialOutcome
-from learning.preconditions import START, Needs, Situation
+from learning.preconditions import START, Needs, Situation, conjunctions
 from learning.subgoal_graph import GraphSelector
 from tests.support.abstract_table import needs
 
@@ -95,6 +95,37 @@ def test_a_miss_never_says_that_something_must_be_off():
         g.learn(trial(3, (1,), outcome=NOT_REACHED, epoch=epoch))
     assert g.beliefs[3].marginals()[1][1] == pytest.approx(before, abs=0.01)
     assert g.most_probable(3) == needs()
+
+
+def test_what_was_believed_for_long_is_the_first_guess_when_it_no_longer_suffices():
+    # For two hundred epochs goal 3 needed goal 1; now that is not enough. What else there may be is sought with 1 on.
+    g = graph(hazard=0.002, local_change=0.8)
+    for epoch in range(200):
+        g.learn(trial(3, (1,), epoch=epoch))
+        g.learn(trial(3, outcome=NOT_REACHED, epoch=epoch))
+    for epoch in range(200, 206):
+        g.learn(trial(3, (1,), outcome=BLOCKED, epoch=epoch))
+    chance = dict(zip(conjunctions(N, 3, 3), g.beliefs[3].probabilities, strict=True))
+    assert chance[needs([0, 1])] > 3.0 * chance[needs([0, 2])]
+    g.learn(trial(3, (0, 1), epoch=206))
+    g.learn(trial(3, (1,), outcome=BLOCKED, epoch=207))
+    assert g.most_probable(3) == needs([0, 1])
+
+
+def test_where_it_is_unknown_what_a_goal_needs_the_same_is_not_tried_all_epoch_long():
+    selector = GraphSelector(n_goals=N, config=SubgoalSelection(), rng=np.random.default_rng(0))
+    for epoch in range(30):
+        selector.update(trial(3, (1,), epoch=epoch))
+        selector.update(trial(3, outcome=BLOCKED, epoch=epoch))
+    for epoch in range(30, 36):
+        selector.update(trial(3, (1,), outcome=BLOCKED, epoch=epoch))
+    assert not selector.graph.is_known(3, START)
+    tried = []
+    for _ in range(6):
+        step = selector.select(goal=3, state=flags(), available=(True,) * N, temperature=0.1, explore=True)
+        selector.update(trial(step, outcome=BLOCKED, epoch=40))
+        tried.append(step)
+    assert len(set(tried)) > 1
 
 
 def test_one_strange_success_is_overturned_by_misses_though_nothing_ever_looks_blocked():

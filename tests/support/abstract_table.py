@@ -100,7 +100,10 @@ class AbstractTable:
         if self._rng.random() < self._skills.drop:
             self._let_go()
         is_skilled = self._rng.random() < self.skill(goal)
-        if is_skilled and self._allows(goal):
+        thing = self._carried.get(goal)
+        if thing is not None and not self.holds[thing]:
+            outcome = TrialOutcome.NOT_REACHED
+        elif is_skilled and self._allows(goal):
             self._achieve(goal)
             self._n_achieved[goal] += practise
             outcome = TrialOutcome.ACHIEVED
