@@ -25,13 +25,12 @@ class Pendant:
     def say(self, *lines: str) -> list[str]:
         """Send lines and return the answers."""
         with socket.create_connection((self.host, DASHBOARD), timeout=ANSWER_S) as connection:
-            spoken = connection.makefile("rwb")
-            spoken.readline()
+            heard = connection.makefile("rb")
+            heard.readline()
             answers = []
             for line in lines:
-                spoken.write(line.encode() + b"\n")
-                spoken.flush()
-                answers.append(spoken.readline().decode().strip())
+                connection.sendall(line.encode() + b"\n")
+                answers.append(heard.readline().decode().strip())
             return answers
 
     def unlock(self) -> None:

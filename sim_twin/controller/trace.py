@@ -22,7 +22,7 @@ _HEAD = struct.Struct("<q")
 
 
 class TraceWriter:
-    """Writes one row a slice: time (s, the host's monotonic), number of the slice, power to move, q and qd of the joints.
+    """Writes one row a slice: the host's monotonic time (s), number of the slice, power, q, qd.
 
     Args:
         path: The file; made anew.
