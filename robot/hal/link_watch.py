@@ -54,13 +54,12 @@ class LinkWatch:
     def _take(self, descriptor: int, address: str) -> None:
         duplicate = os.dup(descriptor)
         try:
-            with socket.socket(fileno=os.dup(descriptor)) as connection:
-                peer, own = connection.getpeername(), connection.getsockname()
+            connection = socket.socket(fileno=duplicate)
         except OSError:
             os.close(duplicate)
-            raise
-        if peer[:2] != (address, self._port) or own in self._duplicates:
-            os.close(duplicate)
             return
-        self._duplicates[own] = duplicate
-        self._poll.register(duplicate, select.POLLRDHUP)
+        with connection:
+            peer, own = connection.getpeername(), connection.getsockname()
+            if peer[:2] == (address, self._port) and own not in self._duplicates:
+                self._duplicates[own] = connection.detach()
+                self._poll.register(duplicate, select.POLLRDHUP)
