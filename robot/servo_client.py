@@ -4,6 +4,7 @@ from collections.abc import Callable
 from multiprocessing import get_context
 from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
+from time import sleep
 from typing import TypeVar
 
 import msgspec
@@ -41,7 +42,8 @@ STRIDE_SLACK_S = 5.0
 CLOSE_S = 5.0
 LEAVE_S = 3.0
 """How long a process that has lost its arm may take to stop it, where it still can, and to end."""
-
+COAST_S = 0.5
+"""Longer than the controller's watchdog waits and the arm then takes to rest."""
 
 R = TypeVar("R", Connected, Seeded, Outputs, StrideReply, Done)
 
@@ -86,12 +88,9 @@ class ServoClient:
         Raises:
             RobotError: the arm could not be acquired; the process has ended again.
         """
-        if self._is_leaving and self._process is not None:
-            self._process.join(LEAVE_S)
-            self._kill()
-        if self._process is not None and self._process.is_alive():
+        self._reap()
+        if self._process is not None:
             return
-        self._kill()
         context = get_context("spawn")
         ours, theirs = context.Pipe()
         pulse = context.RawArray("q", 1)
@@ -113,8 +112,17 @@ class ServoClient:
         self._ask(Engage(), Done, ENGAGE_S)
 
     def stop(self) -> None:
-        """Stop the arm and give up command."""
-        self._ask(Stop(), Done, ANSWER_S)
+        """Stop the arm and give up command. Where no process holds it any more, wait until its own watchdog has."""
+        self._reap()
+        if self._process is not None:
+            try:
+                self._ask(Stop(), Done, ANSWER_S)
+            except WireError:
+                if self._process is not None:
+                    raise
+            else:
+                return
+        sleep(COAST_S)
 
     def begin_epoch(self, epoch: int) -> int:
         """Take up the rules of an epoch and return the outputs it begins with."""
@@ -200,6 +208,14 @@ class ServoClient:
         except (EOFError, OSError):
             return None  # whoever asks next says so
         return reply if isinstance(reply, StrideReply) else None
+
+    def _reap(self) -> None:
+        """Clear away a process that has ended, and one that is about to, in its time."""
+        if self._is_leaving and self._process is not None:
+            self._process.join(LEAVE_S)
+            self._kill()
+        elif self._process is not None and not self._process.is_alive():
+            self._kill()
 
     def _kill(self) -> None:
         process, self._process = self._process, None

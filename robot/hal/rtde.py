@@ -13,7 +13,6 @@ from time import monotonic_ns
 
 from dashboard_client import DashboardClient
 from rtde_control import RTDEControlInterface
-from rtde_io import RTDEIOInterface
 from rtde_receive import RTDEReceiveInterface
 
 from config.arm import ArmConfig
@@ -22,6 +21,7 @@ from robot.geometry import quat_of_rotation_vector
 from robot.hal.link_watch import LinkWatch
 from robot.hal.robotiq import GripScale, RobotiqGripper
 from robot.hal.rtde_clock import RtdeClock
+from robot.hal.rtde_outputs import N_OUTPUTS, DigitalOutputs
 from robot.hal.ur_checks import check_facts, check_pose
 from robot.hal.ur_primary import read_facts
 from robot.hal.ur_state import (
@@ -40,9 +40,6 @@ __all__ = ["RtdeArm"]
 
 RATE_HZ = 500.0
 STALE_NS = 50_000_000
-N_BITS = 16
-N_STANDARD = 8
-"""Outputs below are standard ones, the rest configurable ones of the control box."""
 WATCHDOG_HZ = 10.0
 """Commands that come less often stop the program on the controller's side."""
 PROOF_S = 0.5
@@ -50,8 +47,8 @@ PROOF_S = 0.5
 PROOF_WALL_S = 5.0
 PAYLOAD_TOLERANCE_KG, TCP_TOLERANCE = 0.05, 1e-4
 RTDE_PORT = 30004
-WRITE_NS = 20_000_000
-"""A command that took longer was no mere sending: the client may have reconnected in it, or waited for the script."""
+WRITE_NS = 35_000_000
+"""A command that took longer was no mere sending: the client may have reconnected in it, which takes 40 ms at least."""
 REASON_TICKS = 5
 STOP_RAD_S2, REST_S, STILL_RAD_S = 10.0, 1.0, 0.01
 START_S = 2.0
@@ -69,7 +66,7 @@ class RtdeArm:
         """
         joints = arm.joints
         self.spec = ArmSpec(
-            model=arm.name, rate_hz=RATE_HZ, n_inputs=N_BITS, n_outputs=N_BITS,
+            model=arm.name, rate_hz=RATE_HZ, n_inputs=N_OUTPUTS, n_outputs=N_OUTPUTS,
             q_min_rad=_vec6([j.range_rad[0] for j in joints]), q_max_rad=_vec6([j.range_rad[1] for j in joints]),
             qd_max_rad_s=_vec6([j.speed_rad_s for j in joints]), grip_stroke_m=arm.tool.stroke_m,
         )  # fmt: skip
@@ -81,10 +78,9 @@ class RtdeArm:
         self._receive: RTDEReceiveInterface | None = None
         self._dashboard: DashboardClient | None = None
         self._control: RTDEControlInterface | None = None
-        self._outputs: RTDEIOInterface | None = None
+        self._outputs: DigitalOutputs | None = None
         self._gripper = RobotiqGripper(GripScale.of(arm.tool))
         self._last_timestamp, self._seen_ns = -1.0, 0
-        self._put_bits = 0
         self._links = LinkWatch(address, RTDE_PORT)
         self._is_lost = False
         self._runtime = Runtime.STOPPED
@@ -196,7 +192,9 @@ class RtdeArm:
             )
         self._require(taken, "servoJ")
         self._gripper.command(command.grip)
-        self._put_outputs(command.digital_out)
+        assert self._outputs is not None, "engage made it"
+        untaken = self._outputs.put(command.digital_out)
+        self._require(untaken is None, f"digital output {untaken}")
 
     def stop(self) -> bool:
         """Bring the arm to rest and give up command; the hand keeps its grip. Returns whether rest was seen.
@@ -308,8 +306,7 @@ class RtdeArm:
             if monotonic_ns() > deadline_ns:
                 raise ArmRefusedError(f"expected payload {tool.mass_kg} kg, the controller says {receive.getPayload()}")
             self.clock.wait_tick()
-        self._outputs = RTDEIOInterface(self.address)
-        self._put_bits = receive.getActualDigitalOutputBits() & _ALL_BITS
+        self._outputs = DigitalOutputs(self.address, bits=receive.getActualDigitalOutputBits() & _ALL_BITS)
         if not self._gripper.is_active:
             self._gripper.activate()
         # From here on somebody must write: a command every 100 ms at least, or the program ends.
@@ -329,29 +326,13 @@ class RtdeArm:
             with suppress(RuntimeError):
                 control.disconnect()
         if outputs is not None:
-            with suppress(RuntimeError):
-                outputs.disconnect()
+            outputs.close()
 
     def _end_program(self) -> None:
         """End what a stop has only paused: nothing may go on by itself when somebody releases the stop."""
         if self._dashboard is not None and self._runtime not in (Runtime.STOPPED, Runtime.STOPPING):
             with suppress(RuntimeError):
                 self._dashboard.stop()
-
-    def _put_outputs(self, digital_out: int) -> None:
-        changed = self._put_bits ^ digital_out
-        for i in range(N_BITS):
-            if changed >> i & 1:
-                self._put_output(i, is_on=bool(digital_out >> i & 1))
-        self._put_bits = digital_out
-
-    def _put_output(self, i: int, *, is_on: bool) -> None:
-        assert self._outputs is not None, "engage made it"
-        if i < N_STANDARD:
-            taken = self._outputs.setStandardDigitalOut(i, is_on)
-        else:
-            taken = self._outputs.setConfigurableDigitalOut(i - N_STANDARD, is_on)
-        self._require(taken, f"digital output {i}")
 
     def _require(self, is_taken: bool, what: str) -> None:
         if is_taken:
@@ -398,4 +379,4 @@ def _vec6(values: Sequence[float]) -> Vec6:
     return a, b, c, d, e, f
 
 
-_ALL_BITS = (1 << N_BITS) - 1
+_ALL_BITS = (1 << N_OUTPUTS) - 1

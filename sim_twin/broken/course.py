@@ -20,7 +20,7 @@ __all__ = ["Course"]
 
 BORNE_S = 1.5
 SETTLE_S, AFTER_S, REST_LIMIT_S = 0.3, 0.5, 8.0
-N_TRIES = 4
+N_TRIES = 6
 
 
 class Course:

@@ -71,6 +71,18 @@ def test_a_process_that_was_killed_is_said_and_a_new_one_starts_without_command(
         stride(client, go())
 
 
+def test_what_holds_no_arm_any_more_is_stopped_without_complaint(client):
+    client.engage()
+    client.seed()
+    os.kill(client.pid, signal.SIGKILL)
+    client.stop()
+    assert client.pid is None
+    client.stop()
+    client.engage()
+    client.seed()
+    assert stride(client, go()).verdict is None
+
+
 def test_a_process_that_hangs_is_killed_and_that_is_said(client):
     client.engage()
     client.seed()

@@ -2,6 +2,7 @@
 
 import math
 import time
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from tests.support.port_fuzz import PORTS, FuzzBeside
 
 HOST = "127.0.0.34"
 PERIOD_S, SWING_RAD = 0.004, 0.02
+GROWTH_MB = 40.0
 N_BRIEF, N_FULL = 2_000, 100_000
 
 
@@ -41,8 +43,13 @@ class Servoing:
         return (self.seen_s[-1] - self.seen_s[0]) / wall_s
 
 
+def resident_mb(pid):
+    return int(Path(f"/proc/{pid}/statm").read_text().split()[1]) * 4096 / 1e6
+
+
 def check(station, kind, n):
     station.recover()
+    before_mb = resident_mb(station.process.pid)
     alone = Servoing(station)
     pace_alone = alone.run(lambda: True)
     beside = Servoing(station)
@@ -56,6 +63,7 @@ def check(station, kind, n):
     assert max(beside.off_rad) < 2 * SWING_RAD
     assert pace > 0.5 * pace_alone
     station.control.servoStop()
+    assert resident_mb(station.process.pid) - before_mb < GROWTH_MB
     answers(station)
 
 
