@@ -207,7 +207,8 @@ class RtdeArm:
             with suppress(RuntimeError):
                 self._control.servoStop(STOP_RAD_S2)
         is_resting = self._wait_rest()
-        self._drop_control()
+        if not self._is_lost:
+            self._drop_control()
         return is_resting
 
     def close(self) -> None:

@@ -11,7 +11,7 @@ __all__ = ["NOTICED_S", "Outcome"]
 NOTICED_S = 0.1
 STILL_RAD = 1e-3
 """Nothing that rests may move farther by itself."""
-REST_SHARE, REST_SLACK_S = 1.25, 0.02
+REST_SLACK_S = 0.03
 
 
 class Outcome(msgspec.Struct, frozen=True, kw_only=True):
@@ -71,7 +71,7 @@ class Outcome(msgspec.Struct, frozen=True, kw_only=True):
         wrong: list[str] = []
         if not self.noticed_s <= noticed_s:
             wrong.append(f"noticed after {1e3 * self.noticed_s:.0f} ms")
-        if not self.stop.rest_s <= REST_SHARE * self.stop.predicted_s + REST_SLACK_S:
+        if not self.stop.rest_s <= self.stop.predicted_s + REST_SLACK_S:
             wrong.append(f"rest after {self.stop.rest_s:.3f} s, predicted {self.stop.predicted_s:.3f} s")
         if not max(self.stop.after_rad, self.restored_rad or 0.0) <= STILL_RAD:
             wrong.append(f"moved {self.stop.after_rad:.4f} rad at rest, {self.restored_rad} rad after the fault's end")
