@@ -11,6 +11,7 @@ from typing import Annotated, Protocol
 import msgspec
 import typer
 from rich.console import Console
+from rich.markup import escape
 from rich.table import Table
 
 __all__ = ["BENCH_GROUP", "Bench", "BenchReport", "BenchResult", "bench", "bench_report"]
