@@ -105,7 +105,9 @@ def _print_table(report: BenchReport) -> None:
     for result in report.results:
         verdict = "" if not result.goal else "yes" if result.ok else "NO"
         details = ", ".join(f"{key} {text}" for key, text in (result.details or {}).items())
-        table.add_row(result.name, f"{result.value:.6g}", result.unit, result.goal, verdict, *([details] * has_details))
+        table.add_row(
+            result.name, f"{result.value:.6g}", result.unit, result.goal, verdict, *([escape(details)] * has_details)
+        )
     console = Console()
     console.print(table)
     machine = ", ".join(f"{key} {value}" for key, value in report.machine.items())
