@@ -11,6 +11,7 @@ from typing import Annotated, Protocol
 import msgspec
 import typer
 from rich.console import Console
+from rich.markup import escape
 from rich.table import Table
 
 __all__ = ["BENCH_GROUP", "Bench", "BenchReport", "BenchResult", "bench", "bench_report"]
@@ -28,6 +29,8 @@ class BenchResult(msgspec.Struct, frozen=True, kw_only=True):
     goal: str = ""
     """What the figure is asked to be, in words (`<= 300`); empty where nothing is asked."""
     ok: bool = True
+    details: dict[str, str] | msgspec.UnsetType = msgspec.UNSET
+    """What stands behind the figure, in words, by name; absent where nothing does."""
 
 
 class BenchReport(msgspec.Struct, frozen=True, kw_only=True):
@@ -89,10 +92,22 @@ def _measure(point: EntryPoint, *, full: bool, run: Path | None) -> BenchReport:
 
 
 def _print_table(report: BenchReport) -> None:
-    table = Table("name", "value", "unit", "goal", "ok", title=f"bench {report.bench}, {report.seconds:.1f} s")
+    has_details = any(result.details for result in report.results)
+    table = Table(
+        "name",
+        "value",
+        "unit",
+        "goal",
+        "ok",
+        *(["details"] * has_details),
+        title=f"bench {report.bench}, {report.seconds:.1f} s",
+    )
     for result in report.results:
         verdict = "" if not result.goal else "yes" if result.ok else "NO"
-        table.add_row(result.name, f"{result.value:.6g}", result.unit, result.goal, verdict)
+        details = ", ".join(f"{key} {text}" for key, text in (result.details or {}).items())
+        table.add_row(
+            result.name, f"{result.value:.6g}", result.unit, result.goal, verdict, *([escape(details)] * has_details)
+        )
     console = Console()
     console.print(table)
     machine = ", ".join(f"{key} {value}" for key, value in report.machine.items())

@@ -1,10 +1,13 @@
 """The process that holds an arm: motion, gate and client, and nothing else. It ticks as long as it is in command.
 
 Between intents it holds the arm at rest, so that the controller's watchdog is fed by commands that passed the gate, and
-by nothing else. When the pipe to its station closes it stops the arm and ends. After a loss of the arm it ends too: the
-client library must never get the chance to reconnect and go on by itself.
+by nothing else. When the pipe to its station closes it stops the arm and ends. After a loss of the arm it ends too,
+at once where nothing is known of the arm any more: the client library must never get the chance to reconnect and go on
+by itself. What latched is told before the arm is stopped, for a stop takes its time.
 """
 
+import os
+from collections.abc import Callable, MutableSequence
 from multiprocessing.connection import Connection
 
 import msgspec
@@ -39,22 +42,45 @@ __all__ = ["ServoServer", "serve"]
 
 IDLE_S = 0.002
 """How long a process that is not in command waits for a request at a time."""
-WIRE_REASONS = (Reason.STALE_STATE.value,)
+LOST = Reason.STALE_STATE.value
+"""Nothing is known of the arm: nothing more may be said to its client."""
+ENDING_REASONS = (LOST, Reason.ARM_REFUSED.value, Reason.WIRE.value)
+"""After these the process ends."""
+LOST_CODE = 3
+NOT_TICKING = 0
 
 
-def serve(connection: Connection, resolved_json: bytes) -> None:
+def serve(connection: Connection, resolved_json: bytes, pulse: MutableSequence[int]) -> None:
     """Run a servo process until its station lets go of it.
 
     Args:
         connection: the pipe to the station.
         resolved_json: everything the rig is made of.
+        pulse: shared memory of one number: ticks so far while it ticks, otherwise 0.
     """
     resolved = msgspec.json.decode(resolved_json, type=Resolved)
     plant = build_plant(rig=resolved.rig, arm=resolved.arm, scenario=resolved.scenario)
+    server: ServoServer
+
+    def latched(verdict: Verdict) -> None:
+        server.latched(verdict)
+
     loop = TickLoop(
-        arm=plant.arm, config=resolved.arm, scenario=resolved.scenario, rule_sets=resolved.rule_sets, rig=resolved.rig
+        arm=plant.arm,
+        config=resolved.arm,
+        scenario=resolved.scenario,
+        rule_sets=resolved.rule_sets,
+        rig=resolved.rig,
+        when_latched=latched,
     )
-    server = ServoServer(connection=connection, plant=plant, loop=loop, tool=resolved.arm.tool)
+    server = ServoServer(
+        connection=connection,
+        plant=plant,
+        loop=loop,
+        tool=resolved.arm.tool,
+        pulse=pulse,
+        die=lambda: os._exit(LOST_CODE),
+    )
     try:
         server.run()
     except (EOFError, OSError, KeyboardInterrupt):
@@ -67,18 +93,32 @@ def serve(connection: Connection, resolved_json: bytes) -> None:
 class ServoServer:
     """Answers one station's requests, and ticks in between.
 
-    Attributes:
-        n_ticks: Ticks run so far; a station that watches it sees the process at work.
+    Args:
+        connection: the pipe to the station.
+        plant: what is driven.
+        loop: its loop, which tells `latched`.
+        tool: of the arm's file.
+        pulse: shared memory of one number: ticks so far while it ticks, otherwise 0.
+        die: ends the process on the spot.
     """
 
-    def __init__(self, *, connection: Connection, plant: Plant, loop: TickLoop, tool: Tool) -> None:
+    def __init__(
+        self,
+        *,
+        connection: Connection,
+        plant: Plant,
+        loop: TickLoop,
+        tool: Tool,
+        pulse: MutableSequence[int],
+        die: Callable[[], object],
+    ) -> None:
         self._connection, self._plant, self._loop, self._tool = connection, plant, loop, tool
+        self._pulse, self._die = pulse, die
         self._decode = msgspec.msgpack.Decoder(Request).decode
         self._encode = msgspec.msgpack.Encoder().encode
         self._is_in_command = self._is_over = False
         self._grip: GripCommand | None = None
-        self._n_left = 0
-        self.n_ticks = 0
+        self._n_left = self._n_ticks = 0
 
     def run(self) -> None:
         """Serve until closed, or until the arm was lost."""
@@ -90,34 +130,34 @@ class ServoServer:
                 self._answer(self._decode(self._connection.recv_bytes()))
                 is_ticking = True
 
+    def latched(self, verdict: Verdict) -> None:
+        """Tell the station before the arm is stopped. Between time steps it finds the word when it asks for one."""
+        self._pulse[0] = NOT_TICKING
+        is_begun, self._n_left = self._n_left > 0, 0
+        self._is_in_command = False
+        self._send(StrideReply(stride=self._loop.report(verdict, is_begun=is_begun)))
+        if verdict.reason == LOST:
+            self._die()
+        self._is_over = verdict.reason in ENDING_REASONS
+
     def _tick(self) -> None:
         assert self._grip is not None, "seeding sets it"
         verdict = self._loop.tick(self._grip)
-        self.n_ticks += 1
+        if verdict is not None:
+            return
+        self._n_ticks += 1
+        self._pulse[0] = self._n_ticks
         if self._n_left:
             self._n_left -= 1
-            if verdict is not None or not self._n_left:
-                self._end_stride(verdict)
-        elif verdict is not None:
-            self._lose(verdict)
-
-    def _end_stride(self, verdict: Verdict | None) -> None:
-        self._n_left = 0
-        self._send(StrideReply(stride=self._loop.report(verdict, is_begun=True)))
-        if verdict is None:
-            self._loop.rest()
-        else:
-            self._lose(verdict)
-
-    def _lose(self, verdict: Verdict) -> None:
-        """Command is gone after a refusal; after a loss of the arm so is this process."""
-        self._is_in_command = False
-        self._is_over = verdict.reason in WIRE_REASONS
+            if not self._n_left:
+                self._send(StrideReply(stride=self._loop.report(None, is_begun=True)))
+                self._loop.rest()
 
     def _answer(self, request: Request) -> None:
         if isinstance(request, StrideRequest):
             self._begin_stride(request)
             return
+        self._pulse[0] = NOT_TICKING
         try:
             reply = self._obey(request)
         except RobotError as error:
@@ -132,9 +172,6 @@ class ServoServer:
         verdict = self._loop.begin(request.intent, n_ticks=request.n_ticks, is_hand_busy=request.is_hand_busy)
         if verdict is None:
             self._n_left = request.n_ticks
-            return
-        self._send(StrideReply(stride=self._loop.report(verdict, is_begun=False)))
-        self._lose(verdict)
 
     def _obey(self, request: Request) -> Reply:
         match request:

@@ -1,5 +1,7 @@
 """What runs each tick of an arm: read, cell, motion, gate, wait. Knows nothing of percepts, reflexes or arming."""
 
+from collections.abc import Callable
+
 import msgspec
 
 from config.arm import ArmConfig
@@ -7,7 +9,7 @@ from config.rig import Rig
 from config.rules import RuleSet
 from config.scenario import Scenario
 from robot.cell import Cell
-from robot.errors import RobotConfigError, WireError
+from robot.errors import ArmRefusedError, RobotConfigError, StaleStateError, WireError
 from robot.hal.protocols import Arm
 from robot.kinematics import ToolChain
 from robot.messages import ArmCommand, ArmState, GripCommand, Hold, Intent, Vec3, Verdict
@@ -43,7 +45,14 @@ class TickLoop:
     """
 
     def __init__(
-        self, *, arm: Arm, config: ArmConfig, scenario: Scenario, rule_sets: tuple[RuleSet, ...], rig: Rig
+        self,
+        *,
+        arm: Arm,
+        config: ArmConfig,
+        scenario: Scenario,
+        rule_sets: tuple[RuleSet, ...],
+        rig: Rig,
+        when_latched: Callable[[Verdict], object] | None = None,
     ) -> None:
         """Put the parts together; the arm is not connected to.
 
@@ -53,6 +62,7 @@ class TickLoop:
             scenario: the table.
             rule_sets: one for each span of the scenario's schedule.
             rig: how long a tick is.
+            when_latched: told of a refusal before the arm is stopped for it.
 
         Raises:
             RobotConfigError: the arm's tick is another.
@@ -64,7 +74,7 @@ class TickLoop:
         self._cell = Cell(scenario=scenario, rule_sets=rule_sets, arm=config)
         self._mover = Mover(config, table_m=table_m, tick_s=rig.tick_s)
         limits = GateLimits.of(config, arm.spec, table_m=table_m, tick_s=rig.tick_s)
-        self._gate = Gate(arm=arm, limits=limits, chain=ToolChain(config))
+        self._gate = Gate(arm=arm, limits=limits, chain=ToolChain(config), when_latched=when_latched)
         self._tick_s, self._tick_ns = rig.tick_s, round(rig.tick_s * 1e9)
         self.state: ArmState
         self._before: ArmState
@@ -93,7 +103,7 @@ class TickLoop:
 
     def seed(self) -> ArmState:
         """Start everything from the measured state, and return it."""
-        state = self.state = self._arm.read()
+        state = self.state = self._before = self._arm.read()
         self._gate.seed(state)
         self._mover.seed(state)
         return state
@@ -153,7 +163,7 @@ class TickLoop:
                 arm.clock.wait_tick()
                 self.state = arm.read()
         except WireError as error:
-            return gate.latch(Reason.STALE_STATE, str(error), now_ns=now_ns)
+            return gate.latch(_reason_of(error), str(error), now_ns=now_ns)
         return verdict
 
     def _read(self, now_ns: int) -> ArmState:
@@ -169,3 +179,10 @@ class TickLoop:
             before=self._before, after=self.state, is_begun=is_begun, target_m=mover.target_m, limiters=mover.limiters,
             is_in_contact=mover.is_in_contact, verdict=verdict,
         )  # fmt: skip
+
+
+def _reason_of(error: WireError) -> Reason:
+    """Return why nothing may move: nothing is known of the arm, it does not obey, or another wire failed."""
+    if isinstance(error, StaleStateError):
+        return Reason.STALE_STATE
+    return Reason.ARM_REFUSED if isinstance(error, ArmRefusedError) else Reason.WIRE

@@ -3,7 +3,8 @@
 Connecting reads only: the receive and dashboard clients. The control client uploads a script and stops whatever program
 runs, so it is made by `engage`, after somebody has armed. It never outlives a stop or a stale state, because it would
 go on by itself where it was left: it repeats a command after a reconnection, and the script acts on the registers' last
-values. Whoever wants to move again makes a new one, by `engage`.
+values. Whoever wants to move again makes a new one, by `engage`. Where the link was lost the client is not even told to
+stop, for any word to it may make it reconnect: the controller's watchdog stops the arm, and the process has to end.
 """
 
 from collections.abc import Iterator, Sequence
@@ -12,14 +13,15 @@ from time import monotonic_ns
 
 from dashboard_client import DashboardClient
 from rtde_control import RTDEControlInterface
-from rtde_io import RTDEIOInterface
 from rtde_receive import RTDEReceiveInterface
 
 from config.arm import ArmConfig
 from robot.errors import ArmRefusedError, NotEngagedError, RobotError, StaleStateError, WireError
 from robot.geometry import quat_of_rotation_vector
+from robot.hal.link_watch import LinkWatch
 from robot.hal.robotiq import GripScale, RobotiqGripper
 from robot.hal.rtde_clock import RtdeClock
+from robot.hal.rtde_outputs import N_OUTPUTS, DigitalOutputs
 from robot.hal.ur_checks import check_facts, check_pose
 from robot.hal.ur_primary import read_facts
 from robot.hal.ur_state import (
@@ -27,6 +29,7 @@ from robot.hal.ur_state import (
     UrStatus,
     check_ready,
     check_version,
+    is_well,
     mode_of,
     parse_version,
     why_refused,
@@ -37,14 +40,16 @@ __all__ = ["RtdeArm"]
 
 RATE_HZ = 500.0
 STALE_NS = 50_000_000
-N_BITS = 16
-N_STANDARD = 8
-"""Outputs below are standard ones, the rest configurable ones of the control box."""
 WATCHDOG_HZ = 10.0
 """Commands that come less often stop the program on the controller's side."""
 PROOF_S = 0.5
-"""Time in which an armed and starved watchdog must have stopped the program."""
+"""Time on the controller's clock in which an armed and starved watchdog must have stopped the program."""
+PROOF_WALL_S = 5.0
 PAYLOAD_TOLERANCE_KG, TCP_TOLERANCE = 0.05, 1e-4
+RTDE_PORT = 30004
+WRITE_NS = 35_000_000
+"""A command that took longer was no mere sending: the client may have reconnected in it, which takes 40 ms at least."""
+REASON_TICKS = 5
 STOP_RAD_S2, REST_S, STILL_RAD_S = 10.0, 1.0, 0.01
 START_S = 2.0
 
@@ -61,7 +66,7 @@ class RtdeArm:
         """
         joints = arm.joints
         self.spec = ArmSpec(
-            model=arm.name, rate_hz=RATE_HZ, n_inputs=N_BITS, n_outputs=N_BITS,
+            model=arm.name, rate_hz=RATE_HZ, n_inputs=N_OUTPUTS, n_outputs=N_OUTPUTS,
             q_min_rad=_vec6([j.range_rad[0] for j in joints]), q_max_rad=_vec6([j.range_rad[1] for j in joints]),
             qd_max_rad_s=_vec6([j.speed_rad_s for j in joints]), grip_stroke_m=arm.tool.stroke_m,
         )  # fmt: skip
@@ -73,10 +78,13 @@ class RtdeArm:
         self._receive: RTDEReceiveInterface | None = None
         self._dashboard: DashboardClient | None = None
         self._control: RTDEControlInterface | None = None
-        self._outputs: RTDEIOInterface | None = None
+        self._outputs: DigitalOutputs | None = None
         self._gripper = RobotiqGripper(GripScale.of(arm.tool))
         self._last_timestamp, self._seen_ns = -1.0, 0
-        self._put_bits = 0
+        self._links = LinkWatch(address, RTDE_PORT)
+        self._is_lost = False
+        self._runtime = Runtime.STOPPED
+        """As the last state read told."""
 
     # ----------------------------------------------------------------------------------------------------- acquire
 
@@ -110,7 +118,10 @@ class RtdeArm:
 
         Raises:
             ArmRefusedError: the arm is not ready, or belongs to somebody else, or its watchdog does not work.
+            StaleStateError: this process lost its link before.
         """
+        if self._is_lost:
+            raise StaleStateError("arm: expected a process that never lost its link; end this one and start another")
         if self._control is not None:
             return
         receive, dashboard = self._reading()
@@ -119,6 +130,7 @@ class RtdeArm:
         self._control = self._take_control()
         try:
             self._set_up(self._control, receive)
+            self._links.look()
         except (RobotError, RuntimeError):
             self._drop_control()  # an arm that was set up by half is nobody's: the next engage begins anew
             raise
@@ -129,14 +141,17 @@ class RtdeArm:
         """Return the newest state.
 
         Raises:
-            StaleStateError: not connected, or the controller's own time has stood still for 50 ms.
+            StaleStateError: not connected, the link was cut, or the controller's own time has stood still for 50 ms.
             WireError: the hand does not answer.
         """
         receive, _ = self._reading()
+        self._require_link()
         self._note_freshness(receive)
         grip = self._gripper.poll()
         if grip is None:
             raise StaleStateError("arm: expected a state of the hand, none came yet")
+        status = self.status()
+        self._runtime = status.runtime
         x, y, z, rx, ry, rz = receive.getActualTCPPose()
         fx, fy, fz, *_ = receive.getActualTCPForce()
         return ArmState(
@@ -149,7 +164,7 @@ class RtdeArm:
             grip=grip,
             digital_in=receive.getActualDigitalInputBits() & _ALL_BITS,
             digital_out=receive.getActualDigitalOutputBits() & _ALL_BITS,
-            mode=mode_of(self.status()),
+            mode=mode_of(status),
         )
 
     def write(self, command: ArmCommand) -> None:
@@ -157,25 +172,43 @@ class RtdeArm:
 
         Raises:
             NotEngagedError: nobody took command, or the arm was stopped since.
-            ArmRefusedError: the controller did not take it.
+            ArmRefusedError: the program that obeys has ended, or the controller did not take it.
+            StaleStateError: the link was cut, or sending took so long that the client may have reconnected.
         """
         if self._control is None:
             raise NotEngagedError("arm: expected connect() and engage() before write(), and again after a stop")
-        servo = self._arm.servo
+        self._require_link()
+        self._require(self._runtime == Runtime.PLAYING, "servoJ")
+        servo, begun_ns = self._arm.servo, monotonic_ns()
         taken = self._control.servoJ(
             list(command.q_rad), 0.0, 0.0, 1.0 / RATE_HZ, servo.lookahead_s, servo.gain
         )  # fmt: skip
+        spent_ns = monotonic_ns() - begun_ns
+        if spent_ns > WRITE_NS:
+            self._is_lost = True
+            raise StaleStateError(
+                f"servoJ: expected it sent within {WRITE_NS / 1e6:g} ms, it took {spent_ns / 1e6:.0f} ms; the client "
+                "may have reconnected by itself"
+            )
         self._require(taken, "servoJ")
         self._gripper.command(command.grip)
-        self._put_outputs(command.digital_out)
+        assert self._outputs is not None, "engage made it"
+        untaken = self._outputs.put(command.digital_out)
+        self._require(untaken is None, f"digital output {untaken}")
 
     def stop(self) -> bool:
-        """Bring the arm to rest and give up command; the hand keeps its grip. Returns whether rest was seen."""
+        """Bring the arm to rest and give up command; the hand keeps its grip. Returns whether rest was seen.
+
+        Where the link was lost nothing is sent: the controller's watchdog stops the arm.
+        """
+        if self._is_lost:
+            return False
         if self._control is not None:
             with suppress(RuntimeError):
                 self._control.servoStop(STOP_RAD_S2)
         is_resting = self._wait_rest()
-        self._drop_control()
+        if not self._is_lost:
+            self._drop_control()
         return is_resting
 
     def close(self) -> None:
@@ -204,6 +237,13 @@ class RtdeArm:
 
     # -------------------------------------------------------------------------------------------------------- inside
 
+    def _require_link(self) -> None:
+        """Raise StaleStateError where the controller hung up, before the client finds out and reconnects."""
+        if self._links.is_cut():
+            self._is_lost = True
+        if self._is_lost:
+            raise StaleStateError("arm: expected its link to stand, it was cut; whoever wants to move begins anew")
+
     def _reading(self) -> tuple[RTDEReceiveInterface, DashboardClient]:
         if self._receive is None or self._dashboard is None:
             raise StaleStateError("arm: expected connect() before read(); nothing was read")
@@ -216,6 +256,7 @@ class RtdeArm:
             self._last_timestamp, self._seen_ns = timestamp, now_ns
         elif now_ns - self._seen_ns > STALE_NS:
             age_ms = (now_ns - self._seen_ns) / 1e6
+            self._is_lost |= self._control is not None
             raise StaleStateError(
                 f"arm: expected a state every 2 ms, the newest is {age_ms:.0f} ms old; is the link up?"
             )
@@ -239,8 +280,9 @@ class RtdeArm:
     def _prove_watchdog(self, control: RTDEControlInterface) -> None:
         """Arm the controller's watchdog, starve it, and see the program end. Nothing has moved yet."""
         self._require(control.setWatchdog(WATCHDOG_HZ), "setWatchdog")
-        deadline_ns = monotonic_ns() + round(PROOF_S * 1e9)
-        while monotonic_ns() < deadline_ns:
+        receive, _ = self._reading()
+        begun_s, deadline_ns = receive.getTimestamp(), monotonic_ns() + round(PROOF_WALL_S * 1e9)
+        while receive.getTimestamp() - begun_s < PROOF_S and monotonic_ns() < deadline_ns:
             self.clock.wait_tick()
             if self.status().runtime == Runtime.STOPPED:
                 control.disconnect()
@@ -265,8 +307,7 @@ class RtdeArm:
             if monotonic_ns() > deadline_ns:
                 raise ArmRefusedError(f"expected payload {tool.mass_kg} kg, the controller says {receive.getPayload()}")
             self.clock.wait_tick()
-        self._outputs = RTDEIOInterface(self.address)
-        self._put_bits = receive.getActualDigitalOutputBits() & _ALL_BITS
+        self._outputs = DigitalOutputs(self.address, bits=receive.getActualDigitalOutputBits() & _ALL_BITS)
         if not self._gripper.is_active:
             self._gripper.activate()
         # From here on somebody must write: a command every 100 ms at least, or the program ends.
@@ -274,35 +315,36 @@ class RtdeArm:
 
     def _drop_control(self) -> None:
         """End the program and forget its client: it must never get the chance to go on by itself."""
+        self._links.forget()
         control, self._control = self._control, None
         outputs, self._outputs = self._outputs, None
         if control is not None:
             with suppress(RuntimeError):
                 control.stopScript()
+            with suppress(RuntimeError, WireError):
+                self._runtime = self.status().runtime
+            self._end_program()
             with suppress(RuntimeError):
                 control.disconnect()
         if outputs is not None:
+            outputs.close()
+
+    def _end_program(self) -> None:
+        """End what a stop has only paused: nothing may go on by itself when somebody releases the stop."""
+        if self._dashboard is not None and self._runtime not in (Runtime.STOPPED, Runtime.STOPPING):
             with suppress(RuntimeError):
-                outputs.disconnect()
-
-    def _put_outputs(self, digital_out: int) -> None:
-        changed = self._put_bits ^ digital_out
-        for i in range(N_BITS):
-            if changed >> i & 1:
-                self._put_output(i, is_on=bool(digital_out >> i & 1))
-        self._put_bits = digital_out
-
-    def _put_output(self, i: int, *, is_on: bool) -> None:
-        assert self._outputs is not None, "engage made it"
-        if i < N_STANDARD:
-            taken = self._outputs.setStandardDigitalOut(i, is_on)
-        else:
-            taken = self._outputs.setConfigurableDigitalOut(i - N_STANDARD, is_on)
-        self._require(taken, f"digital output {i}")
+                self._dashboard.stop()
 
     def _require(self, is_taken: bool, what: str) -> None:
-        if not is_taken:
-            raise ArmRefusedError(f"{what}: the controller did not take it: {why_refused(self.status())}")
+        if is_taken:
+            return
+        status = self.status()
+        for _ in range(REASON_TICKS):  # the reason may come a moment after the refusal
+            if not is_well(status):
+                break
+            self.clock.wait_tick()
+            status = self.status()
+        raise ArmRefusedError(f"{what}: the controller did not take it: {why_refused(status)}")
 
     def _wait_rest(self) -> bool:
         """Wait until the joints rest, at most REST_S. Returns whether they do."""
@@ -338,4 +380,4 @@ def _vec6(values: Sequence[float]) -> Vec6:
     return a, b, c, d, e, f
 
 
-_ALL_BITS = (1 << N_BITS) - 1
+_ALL_BITS = (1 << N_OUTPUTS) - 1

@@ -16,6 +16,7 @@ __all__ = [
     "UrStatus",
     "check_ready",
     "check_version",
+    "is_well",
     "kind_of_address",
     "mode_of",
     "parse_version",
@@ -64,6 +65,11 @@ def mode_of(status: UrStatus) -> ArmMode:
     if status.robot_mode == RUNNING:
         return ArmMode.RUNNING
     return ArmMode.IDLE if status.robot_mode == IDLE else ArmMode.STOPPED
+
+
+def is_well(status: UrStatus) -> bool:
+    """Return whether nothing in a state says why the controller should not obey."""
+    return mode_of(status) is ArmMode.RUNNING and status.runtime == Runtime.PLAYING
 
 
 def why_refused(status: UrStatus) -> str:

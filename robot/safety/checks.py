@@ -50,6 +50,8 @@ class Reason(StrEnum):
     OUT_OF_REASON = "out_of_reason"
     SEQUENCE = "sequence"
     STALE_STATE = "stale_state"
+    ARM_REFUSED = "arm_refused"
+    WIRE = "wire"
     STALE_INTENT = "stale_intent"
     ARM_MODE = "arm_mode"
     JOINT_RANGE = "joint_range"

@@ -1,6 +1,7 @@
 """The safety gate: the only caller of Arm.write. It passes or refuses; a refusal latches."""
 
 import math
+from collections.abc import Callable
 
 from robot.hal.protocols import Arm
 from robot.kinematics import ToolChain
@@ -33,8 +34,24 @@ class Gate:
     and lids stay as they are, until `seed` after an operator has cleared the latch.
     """
 
-    def __init__(self, *, arm: Arm, limits: GateLimits, chain: ToolChain) -> None:
+    def __init__(
+        self,
+        *,
+        arm: Arm,
+        limits: GateLimits,
+        chain: ToolChain,
+        when_latched: Callable[[Verdict], object] | None = None,
+    ) -> None:
+        """Store.
+
+        Args:
+            arm: the only thing that is written to.
+            limits: what is held.
+            chain: where the tool is for given joints.
+            when_latched: told of the refusal that latches, before the arm is stopped: a stop takes its time.
+        """
         self._arm, self._limits, self._chain = arm, limits, chain
+        self._when_latched = when_latched
         self._sequence = 0
         self._force_before_n = 0.0
         self._q_rad: Vec6 = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
@@ -112,9 +129,18 @@ class Gate:
         return refusal or check_tracking(q, state.q_rad, limits)
 
     def _refuse(self, refusal: Refusal, *, stamp_ns: int) -> Verdict:
-        if self._latched is None:
+        is_new = self._latched is None
+        verdict = self._verdict(refusal, stamp_ns)
+        if is_new:
             self._latched = refusal
-            self._arm.stop()
+            try:
+                if self._when_latched is not None:
+                    self._when_latched(verdict)
+            finally:
+                self._arm.stop()
+        return verdict
+
+    def _verdict(self, refusal: Refusal, stamp_ns: int) -> Verdict:
         return Verdict(
             stamp_ns=stamp_ns,
             sequence=self._sequence + 1,

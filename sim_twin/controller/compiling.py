@@ -14,6 +14,8 @@ from sim_twin.controller.script.builtins import Sockets
 
 __all__ = ["Compiled", "Compiler", "InlineCompiler", "Mistake", "ThreadCompiler", "compile_text"]
 
+N_WAITING = 1000
+"""Texts that wait for the compiler; one more is turned away, or a flood would fill the memory."""
 MakeBuiltins = Callable[[Sockets], Builtins]
 
 
@@ -107,6 +109,9 @@ class ThreadCompiler:
         if self._thread is None:
             self._thread = threading.Thread(target=self._work, name="compiler", daemon=True)
             self._thread.start()
+        if self._texts.qsize() >= N_WAITING:
+            self._done.append(Mistake(message=f"expected at most {N_WAITING} programs to wait, one more was sent"))
+            return
         self._texts.put(text)
 
     def take(self) -> Compiled | Mistake | None:

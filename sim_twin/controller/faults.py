@@ -6,7 +6,7 @@ from collections.abc import Callable
 import msgspec
 import numpy as np
 
-from sim_twin.controller.motion import Measured
+from sim_twin.controller.motion import DhRow, Measured, calibrated
 from sim_twin.controller.robot import VirtualRobot
 from sim_twin.controller.states import Event
 from sim_twin.controller.ticks import TickTimes
@@ -43,6 +43,7 @@ class Faults:
         self._bias_rad, self._noise_rad = np.zeros(6), 0.0
         self._by_name: dict[str, Callable[..., Answer | None]] = {
             "bias": self.bias,
+            "calibrate": self.calibrate,
             "delay": self.delay_links,
             "drop": self.drop_links,
             "estop": lambda: self._happen(Event.ROBOT_ESTOP),
@@ -51,9 +52,11 @@ class Faults:
             "freeze": self.freeze_interfaces,
             "freeze_all": self.freeze_all,
             "inputs": self.force_inputs,
+            "jog": self.jog,
             "late": self.late_ticks,
             "log": self.log,
             "noise": self.noise,
+            "payload": self.payload,
             "program": lambda: {"text": self._robot.programs.last_text},
             "program_stop": lambda: self._happen(Event.STOP),
             "protective_stop": lambda: self._happen(Event.PROTECTIVE_STOP),
@@ -75,7 +78,7 @@ class Faults:
         return tuple(sorted(self._by_name))
 
     def apply(self, name: str, **numbers: object) -> Answer:
-        """Bring a fault about, or end it, and return what it tells.
+        """Bring a fault about, or end it, and return what it tells, and when it was (at_s, the host's monotonic time).
 
         Raises:
             FaultError: there is none of that name, or it takes other arguments.
@@ -84,7 +87,7 @@ class Faults:
         if fault is None:
             raise FaultError(f"expected one of {', '.join(self.names)}; got {name!r}")
         try:
-            return fault(**numbers) or {}
+            return {**(fault(**numbers) or {}), "at_s": time.monotonic()}
         except (TypeError, ValueError) as error:
             raise FaultError(f"{name}: {error}") from error
 
@@ -149,6 +152,29 @@ class Faults:
         """Let the joints be read with normal noise of a standard deviation; 0 ends it."""
         self._noise_rad = float(rad)
         self._set_disturbance()
+
+    def payload(self, kg: float = 0.0) -> None:
+        """Let so much more hang on the flange than the controller was told; 0 ends it."""
+        self._robot.machine.drive.hang(float(kg))
+
+    def calibrate(self, mm: float = 0.0, mrad: float = 0.0) -> Answer:
+        """Let the controller's Denavit-Hartenberg rows differ from nominal by as much, each by chance; 0 ends it.
+
+        Told back as rows of (a m, d m, alpha rad, theta rad).
+        """
+        kinematics = self._robot.machine.drive.kinematics
+        most = 1e-3 * np.array([mm, mm, mrad, mrad])
+        off = self._rng.uniform(-1.0, 1.0, (len(kinematics.nominal), 4)) * most
+        deltas = tuple(DhRow(a_m=a, d_m=d, alpha_rad=alpha, theta_rad=theta) for a, d, alpha, theta in off.tolist())
+        kinematics.recalibrate(calibrated(kinematics.nominal, deltas))
+        return {"rows": off.tolist()}
+
+    def jog(self, rad: list[float]) -> None:
+        """Let somebody at the pendant move the joints by as much, with a program of his own."""
+        if len(rad) != 6:
+            raise ValueError(f"expected 6 angles, got {len(rad)}")
+        q = [float(a) + float(b) for a, b in zip(self._robot.machine.drive.measured.q_rad, rad, strict=True)]
+        self._robot.submit_script(f"def jog():\n movej({q}, a=1.0, v=0.5)\nend\n")
 
     def force_inputs(self, bits: int = 0) -> None:
         """Let these digital inputs be on, whatever the table says."""

@@ -18,6 +18,7 @@ from sim_twin.controller.motion import SLICE_S
 from sim_twin.controller.pacing import Pacer
 from sim_twin.controller.robot import VirtualRobot, make_world
 from sim_twin.controller.ticks import TickTimes
+from sim_twin.controller.trace import TraceWriter
 from sim_twin.controller.wire import ControllerVersion, Wires
 from sim_twin.controller.wire.reactor import Reactor
 
@@ -42,6 +43,8 @@ class Setup(msgspec.Struct, frozen=True, kw_only=True):
     """Text of a program to run at the start."""
     bus: str = ""
     """Zenoh endpoint to listen on: the twin's truth, and resets of its table."""
+    trace: str = ""
+    """File for the twin's own joints, slice by slice; see trace.py."""
 
 
 def parse_version(text: str) -> ControllerVersion:
@@ -98,6 +101,7 @@ class ControllerServer:
         self._control = Reactor()
         self._n_ticks = 0
         self._bus: BusPort | None = None
+        self._trace: TraceWriter | None = None
 
     def __enter__(self) -> Self:
         """Open the ports.
@@ -109,6 +113,8 @@ class ControllerServer:
             self.wires.open(self.setup.host)
             if ip_address(self.setup.host).is_loopback:
                 self._control.listen(self.setup.host, CONTROL, ControlPort(self.faults))
+            if self.setup.trace:
+                self._trace = TraceWriter(self.setup.trace)
             if self.setup.bus:
                 self._bus = BusPort(self.robot, self.setup.bus)
         except OSError:
@@ -128,6 +134,9 @@ class ControllerServer:
         if self._bus is not None:
             self._bus.close()
             self._bus = None
+        if self._trace is not None:
+            self._trace.close()
+            self._trace = None
         self._control.close()
         self.wires.close()
         self.robot.close()
@@ -147,6 +156,8 @@ class ControllerServer:
             self.wires.tick(self.robot.machine.drive.n_slices)
             if self._bus is not None:
                 self._bus.tick(self.robot.machine.drive.n_slices)
+            if self._trace is not None:
+                self._note(self._trace)
         spent_s = perf_counter() - begun
         self.robot.machine.execution_s = spent_s
         self.ticks.add(spent_s)
@@ -168,3 +179,8 @@ class ControllerServer:
             self.faults.delay()
             pacer.wait()
             self.ticks.n_missed = pacer.n_missed
+
+    def _note(self, trace: TraceWriter) -> None:
+        drive = self.robot.machine.drive
+        data = drive.world.data
+        trace.add(drive.n_slices, drive.is_braked, data.qpos[:6], data.qvel[:6])

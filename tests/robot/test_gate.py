@@ -199,6 +199,29 @@ def test_seeding_clears_the_latch_and_starts_from_the_measured_joints(gate, arm)
     assert gate.write(command(moved_on), arm_state(moved_on), now_ns=0) is None
 
 
+@pytest.mark.parametrize("listener_fails", [False, True])
+def test_a_refusal_is_told_once_before_the_arm_is_stopped_and_stops_it_whoever_listens(arm, listener_fails):
+    told = []
+
+    def listen(verdict):
+        told.append((verdict.reason, arm.n_stops))
+        if listener_fails:
+            raise BrokenPipeError
+
+    spec = FakeArm(arm=ARM, tick_s=0.01).spec
+    limits = GateLimits.of(ARM, spec, table_m=0.0, tick_s=0.01)
+    gate = Gate(arm=arm, limits=limits, chain=CHAIN, when_latched=listen)
+    gate.seed(arm_state(START))
+    if listener_fails:
+        with pytest.raises(BrokenPipeError):
+            gate.latch(Reason.WIRE, "the hand is gone", now_ns=0)
+    else:
+        gate.latch(Reason.WIRE, "the hand is gone", now_ns=0)
+    assert gate.write(command(START), state(), now_ns=0).reason == Reason.WIRE
+    assert told == [("wire", 0)]
+    assert arm.n_stops == 1
+
+
 def test_limits_are_the_narrower_of_the_arms_file_and_the_arm_itself():
     spec = FakeArm(arm=ARM, tick_s=0.01).spec
     narrow = replace(spec, q_max_rad=(1.0,) * 6, qd_max_rad_s=(0.5,) * 6, grip_stroke_m=0.05)

@@ -2,11 +2,12 @@
 
 import os
 import signal
+import time
 
 import msgspec
 import pytest
 
-from robot.errors import NotEngagedError, RobotConfigError, SafetyError, WireError
+from robot.errors import NotEngagedError, RobotConfigError, SafetyError, StaleStateError, WireError
 from robot.messages import GripCommand, Heading, PlantKind
 from robot.servo_client import ServoClient
 from tests.support.stations import fake_rig
@@ -68,6 +69,47 @@ def test_a_process_that_was_killed_is_said_and_a_new_one_starts_without_command(
     client.connect()
     with pytest.raises(SafetyError, match="engage"):
         stride(client, go())
+
+
+def test_what_holds_no_arm_any_more_is_stopped_without_complaint(client):
+    client.engage()
+    client.seed()
+    os.kill(client.pid, signal.SIGKILL)
+    client.stop()
+    assert client.pid is None
+    client.stop()
+    client.engage()
+    client.seed()
+    assert stride(client, go()).verdict is None
+
+
+def test_a_process_that_hangs_is_killed_and_that_is_said(client):
+    client.engage()
+    client.seed()
+    assert stride(client, go()).verdict is None
+    pid = client.pid
+    os.kill(pid, signal.SIGSTOP)
+    begun = time.monotonic()
+    with pytest.raises(StaleStateError, match="tick"):
+        stride(client, go())
+    assert time.monotonic() - begun < 1.0  # 60 ms on a machine of its own
+    with pytest.raises(ProcessLookupError):
+        os.kill(pid, 0)
+    client.engage()
+    client.seed()
+    assert stride(client, go()).verdict is None
+
+
+def test_a_process_that_is_busy_out_of_command_is_not_hung(client):
+    client.engage()
+    client.seed()
+    client.stop()
+    os.kill(client.pid, signal.SIGSTOP)
+    time.sleep(0.3)
+    os.kill(client.pid, signal.SIGCONT)
+    client.engage()
+    client.seed()
+    assert stride(client, go()).verdict is None
 
 
 def test_an_error_of_the_process_is_raised_here_by_its_kind():

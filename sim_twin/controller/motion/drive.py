@@ -23,7 +23,7 @@ from sim_twin.controller.motion.limits import (
 from sim_twin.controller.motion.motions import Motions
 from sim_twin.controller.motion.poses import Array, pose_from_matrix, vec6
 from sim_twin.controller.motion.setpoint import SLICE_S
-from sim_twin.controller.motion.wrench import NM_PER_A, ContactWrench, payload_bias
+from sim_twin.controller.motion.wrench import GRAVITY_M_S2, NM_PER_A, ContactWrench, payload_bias
 from sim_twin.controller.states import MotionOrder
 from sim_twin.plant import TwinWorld
 
@@ -65,6 +65,7 @@ def servo_lag_s(model: mujoco.MjModel, actuator: int, *, tick_s: float) -> float
     return damping / stiffness + float(model.actuator_delay[actuator]) + tick_s / 2.0
 
 
+MOST_EXTRA_KG = 20.0
 FELT_S = 0.02
 """Time constant of the forces that collisions and the force limit are judged by. A guess: UR publishes none."""
 
@@ -183,6 +184,18 @@ class TwinDrive:
         if not mass_kg >= 0.0:
             raise ValueError(f"payload: expected 0 kg or more, got {mass_kg}; give the mass that hangs on the flange")
         self._payload = (mass_kg, np.array(cog_m, dtype=np.float64))
+
+    def hang(self, extra_kg: float) -> None:
+        """Let so much more hang on the flange than the tool, without telling the controller; 0 takes it off.
+
+        Raises:
+            ValueError: a mass below zero or beyond what any arm of this kind carries.
+        """
+        if not 0.0 <= extra_kg <= MOST_EXTRA_KG:
+            raise ValueError(f"payload: expected 0 to {MOST_EXTRA_KG:g} kg more, got {extra_kg}")
+        tool = self.world.arm.tool
+        self._real_payload = (tool.mass_kg + extra_kg, np.array(tool.com_m))
+        self.world.data.xfrc_applied[self.world.model.body("tool").id, 2] = -GRAVITY_M_S2 * extra_kg
 
     @property
     def payload(self) -> tuple[float, Array]:

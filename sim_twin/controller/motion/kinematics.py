@@ -87,8 +87,17 @@ class ArmKinematics:
 
     def __init__(self, nominal: Rows, *, true: Rows | None = None) -> None:
         self._nominal = nominal
-        self.rows = nominal if true is None else true
-        self._is_nominal = self.rows == nominal
+        self.recalibrate(nominal if true is None else true)
+
+    @property
+    def nominal(self) -> Rows:
+        """The table that the closed form stands on."""
+        return self._nominal
+
+    def recalibrate(self, true: Rows) -> None:
+        """Take another table for the arm's own from now on."""
+        self.rows = true
+        self._is_nominal = self.rows == self._nominal
         self._constants = tuple((r.a_m, r.d_m, math.cos(r.alpha_rad), math.sin(r.alpha_rad)) for r in self.rows)
         self._offsets = tuple(r.theta_rad for r in self.rows)
 

@@ -1,0 +1,47 @@
+"""`autotelic bench faults`: each fault against an arm under way through the whole backend, one row a fault."""
+
+from time import perf_counter
+
+from robot.bench import BenchReport, BenchResult, bench_report
+from sim_twin.broken.course import Course
+from sim_twin.broken.outcome import NOTICED_S, Outcome
+from sim_twin.broken.rider import DisturbedError
+from sim_twin.broken.trials import TRIALS, Trial
+
+__all__ = ["bench_faults"]
+
+HOST = "127.0.0.30"
+
+
+def bench_faults(*, full: bool) -> BenchReport:
+    """Put an arm under way through each fault of a virtual controller.
+
+    Args:
+        full: all faults (some 4 min); otherwise those of a cut, a freeze, a hang and a safeguard.
+    """
+    begun = perf_counter()
+    with Course(HOST) as course:
+        results = [_row(course, trial) for trial in TRIALS if full or trial.is_brief]
+    return bench_report("faults", results, seconds=perf_counter() - begun)
+
+
+def _row(course: Course, trial: Trial) -> BenchResult:
+    try:
+        return _told(course.run(trial))
+    except DisturbedError as error:
+        return BenchResult(
+            name=trial.name, value=0.0, unit="ms", goal="undisturbed", ok=False, details={"disturbed": str(error)}
+        )
+
+
+def _told(outcome: Outcome) -> BenchResult:
+    """Return the row of one fault: its value is how soon it was told, 0 where it was borne."""
+    failures = outcome.failures()
+    details = outcome.details()
+    if failures:
+        details["wrong"] = "; ".join(failures)
+    goal = f"<= {1e3 * NOTICED_S:g}, rest, stay" if outcome.trial.is_stop else "borne"
+    value = 1e3 * (outcome.noticed_s or 0.0)
+    return BenchResult(
+        name=outcome.trial.name, value=round(value, 1), unit="ms", goal=goal, ok=not failures, details=details
+    )

@@ -1,0 +1,138 @@
+"""One fault after the other against an arm under way: what was said, how soon, how it rested, what came after."""
+
+from contextlib import suppress
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from time import monotonic, sleep
+from types import TracebackType
+from typing import Self
+
+from robot.errors import RobotError
+from sim_twin.broken.judge import Judged, Motion
+from sim_twin.broken.outcome import Outcome
+from sim_twin.broken.pendant import Pendant
+from sim_twin.broken.rider import DisturbedError, Rider
+from sim_twin.broken.trials import JOG_RAD, Stage, Trial
+from sim_twin.controller.process import ControllerProcess
+from sim_twin.controller.server import Setup
+
+__all__ = ["Course"]
+
+BORNE_S = 1.5
+SETTLE_S, AFTER_S, REST_LIMIT_S = 0.3, 0.5, 8.0
+N_TRIES = 6
+
+
+class Course:
+    """A virtual controller, and the whole backend that moves its arm; a fresh pair for every fault.
+
+    Args:
+        host: a loopback address that is free.
+    """
+
+    def __init__(self, host: str) -> None:
+        self._host = host
+        self._folder = TemporaryDirectory(prefix="autotelic-faults-")
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._folder.cleanup()
+
+    def run(self, trial: Trial) -> Outcome:
+        """Put the arm through one fault; begin anew where this machine disturbed it before the fault.
+
+        Raises:
+            DisturbedError: it did so each time.
+        """
+        for _ in range(N_TRIES - 1):
+            with suppress(DisturbedError):
+                outcome = self._try(trial)
+                if outcome.again is None:
+                    return outcome
+        return self._try(trial)
+
+    def _try(self, trial: Trial) -> Outcome:
+        trace = Path(self._folder.name) / "trace"
+        with ControllerProcess(Setup(host=self._host, trace=str(trace))), Rider(self._host) as rider:
+            stage = Stage(host=self._host, rider=rider, pendant=Pendant(self._host))
+            return _Run(trial, stage, Motion(trace)).run()
+
+
+class _Run:
+    """One fault, start to end."""
+
+    def __init__(self, trial: Trial, stage: Stage, motion: Motion) -> None:
+        self._trial, self._stage, self._motion = trial, stage, motion
+
+    def run(self) -> Outcome:
+        trial, stage, rider = self._trial, self._stage, self._stage.rider
+        rider.take()
+        happened_s, raised = rider.ride_into(
+            lambda: trial.begin(stage), **({} if trial.is_stop else {"wait_s": BORNE_S})
+        )
+        if raised is not None and raised.at_s < happened_s - 1e-3:
+            raise DisturbedError(f"before {trial.name}: {raised}")
+        if raised is not None and not trial.is_stop:
+            raise DisturbedError(f"{trial.name} was not borne: {raised}")
+        if trial.is_stop:
+            sleep(trial.hold_s)
+        else:
+            rider.client.close()
+            sleep(SETTLE_S)
+        jogged, until_s = self._jog()
+        barred = self._bar() if trial.bars else None
+        ended_s = monotonic()
+        trial.end(stage)
+        stop = self._judge_stop(happened_s, until_s or monotonic())
+        sleep(AFTER_S)
+        restored = self._motion.moved_rad(ended_s if until_s else self._rest_s, monotonic()) if trial.is_stop else None
+        trial.person(stage)
+        taken_s = monotonic()
+        rider.take()
+        rearm = self._motion.moved_rad(taken_s, monotonic())
+        again = rider.ride(0.4)
+        return Outcome(
+            trial=trial,
+            raised=raised,
+            noticed_s=None if raised is None else raised.at_s - happened_s,
+            stop=stop,
+            barred=barred,
+            jogged_rad=jogged,
+            restored_rad=restored,
+            rearm_rad=rearm,
+            again=again,
+        )
+
+    def _jog(self) -> tuple[float | None, float | None]:
+        """Return how far somebody moved a joint, and when he began."""
+        if not self._trial.is_jogged:
+            return None, None
+        began_s = monotonic()
+        self._stage.fault("jog", rad=[-JOG_RAD, 0.0, 0.0, 0.0, 0.0, 0.0])
+        sleep(1.6)
+        return self._motion.moved_rad(began_s, monotonic()), began_s
+
+    def _bar(self) -> str | None:
+        """Try to take the arm while nobody may."""
+        try:
+            self._stage.rider.take()
+        except RobotError as error:
+            return f"{type(error).__name__}: {error}"
+        return None
+
+    def _judge_stop(self, happened_s: float, until_s: float) -> Judged | None:
+        """Wait for rest, where physics still had to go on for it, and judge the stop."""
+        self._rest_s = until_s
+        if not self._trial.is_stop:
+            return None
+        judged = self._motion.judge(happened_s, until_s, begins_s=self._trial.begins_s)
+        end_s = monotonic() + REST_LIMIT_S
+        while judged.after_rad == float("inf") and monotonic() < end_s:
+            sleep(0.1)
+            self._rest_s = monotonic()
+            judged = self._motion.judge(happened_s, self._rest_s, begins_s=self._trial.begins_s)
+        return judged

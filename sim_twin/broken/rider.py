@@ -1,0 +1,129 @@
+"""An arm that is kept moving through the whole backend while something goes wrong with its controller."""
+
+from collections.abc import Callable
+from threading import Thread
+from time import monotonic, sleep
+from typing import Self
+
+import msgspec
+
+from config.loader import resolve
+from config.resolved import Resolved
+from robot.errors import RobotError
+from robot.messages import ArmState, GripCommand, Twist
+from robot.servo_client import ServoClient
+
+__all__ = ["DisturbedError", "Raised", "Rider", "wire_rig"]
+
+SPEED_M_S = 0.35
+REACH_M = 0.16
+"""The tool goes to and fro between these, left and right of the middle."""
+STEP_TICKS = 20
+NEVER_S = 3.0
+"""A backend that has said nothing for so long does not notice."""
+
+
+class DisturbedError(RuntimeError):
+    """Something came up before anything was made to go wrong: this machine was busy elsewhere for too long."""
+
+
+class Raised(msgspec.Struct, frozen=True, kw_only=True):
+    """What a person would have been told, and when."""
+
+    at_s: float
+    """The host's monotonic time."""
+    what: str
+    """Error's class, or the gate's reason."""
+    detail: str
+
+
+def wire_rig(host: str) -> Resolved:
+    """Return the rig virtual_lab for a controller at another loopback address."""
+    resolved = resolve(rig="virtual_lab", scenario="paper", learning="default")
+    return msgspec.structs.replace(resolved, rig=msgspec.structs.replace(resolved.rig, address=host))
+
+
+class Rider:
+    """Moves the arm at a host by the servo process, as a learner's station does.
+
+    Args:
+        host: the controller's address.
+
+    Attributes:
+        client: the station's end of the servo process.
+    """
+
+    def __init__(self, host: str) -> None:
+        self._resolved = wire_rig(host)
+        self.client = ServoClient(self._resolved)
+        tool = self._resolved.arm.tool
+        self._grip = GripCommand(opening_m=tool.stroke_m, force_n=tool.grip_force_n, speed_m_s=tool.speed_m_s[1])
+        self._way = 1.0
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.client.close()
+
+    def take(self) -> ArmState:
+        """Connect, take command as an operator allows it, and start from what is measured.
+
+        Raises:
+            RobotError: the arm is not to be had, and why.
+        """
+        self.client.connect()
+        self.client.engage()
+        self.client.begin_epoch(0)
+        return self.client.seed()
+
+    def step(self) -> Raised | None:
+        """Move on for a time step; return what came up, if anything did."""
+        intent = Twist(linear_m_s=(0.0, self._way * SPEED_M_S, 0.0))
+        try:
+            came = self.client.stride(intent, self._grip, n_ticks=STEP_TICKS, is_hand_busy=False)
+        except RobotError as error:
+            return Raised(at_s=monotonic(), what=type(error).__name__, detail=str(error))
+        if came.verdict is not None:
+            return Raised(at_s=monotonic(), what=came.verdict.reason, detail=came.verdict.detail)
+        y = came.after.tcp_position_m[1]
+        if abs(y) > REACH_M and y * self._way > 0.0:
+            self._way = -self._way
+        self._y_m = y
+        return None
+
+    def ride(self, seconds: float) -> Raised | None:
+        """Move for a while; return what came up, if anything did."""
+        end_s = monotonic() + seconds
+        while monotonic() < end_s:
+            raised = self.step()
+            if raised is not None:
+                return raised
+        return None
+
+    def ride_into(self, inject: Callable[[], float], *, wait_s: float = NEVER_S) -> tuple[float, Raised | None]:
+        """Let something go wrong in the middle of the way at full speed, and ride on until something is said.
+
+        Args:
+            inject: brings it about from another thread, at no particular phase of a step; returns when it happened.
+            wait_s: how long to ride on where nothing is said.
+
+        Returns:
+            When it happened, and what came up.
+        """
+        raised = self.ride(0.6)
+        while raised is None and not (abs(self._y_m) < REACH_M / 2 and self._y_m * self._way < 0.0):
+            raised = self.step()
+        if raised is not None:
+            raise DisturbedError(f"before anything went wrong: {raised}")
+        happened: list[float] = []
+
+        def happen() -> None:
+            sleep(0.013)
+            happened.append(inject())
+
+        thread = Thread(target=happen)
+        thread.start()
+        raised = self.ride(wait_s)
+        thread.join()
+        return happened[0], raised

@@ -1,0 +1,143 @@
+"""The faults that an arm under way is put through, and what is expected of each."""
+
+import os
+import signal
+from collections.abc import Callable
+from time import monotonic, sleep
+from typing import Any
+
+import msgspec
+
+from sim_twin.broken.pendant import Pendant
+from sim_twin.broken.rider import Rider
+from sim_twin.controller.process import ask_fault
+
+__all__ = ["JOG_RAD", "TRIALS", "Stage", "Trial"]
+
+JOG_RAD = 0.3
+
+
+class Stage(msgspec.Struct, frozen=True, kw_only=True):
+    """What a trial acts on."""
+
+    host: str
+    rider: Rider
+    pendant: Pendant
+
+    def fault(self, name: str, **numbers: object) -> float:
+        """Bring a fault about, and return when it was (s, the host's monotonic time)."""
+        return float(str(ask_fault(self.host, name, **numbers)["at_s"]))
+
+
+def _nothing(_: Stage) -> None: ...
+
+
+class Trial(msgspec.Struct, frozen=True, kw_only=True):
+    """One fault."""
+
+    name: str
+    begin: Callable[[Stage], float]
+    """Brings it about and returns when it was."""
+    end: Callable[[Stage], Any] = _nothing
+    """Ends it: the link is restored, the stop's cause is gone."""
+    person: Callable[[Stage], Any] = _nothing
+    """What a person does before anybody may take the arm again."""
+    is_stop: bool = True
+    """It must be noticed, and the arm must come to rest; else it may be borne."""
+    begins_s: float = 0.0
+    """How long after it a stop may begin, where commands were still under way."""
+    hold_s: float = 0.4
+    """How long it lasts after it was noticed."""
+    is_jogged: bool = False
+    """Somebody moves the joints meanwhile, at the pendant."""
+    bars: bool = False
+    """While it lasts nobody may take the arm."""
+    is_brief: bool = False
+    """Part of the short bench."""
+
+
+def _by(name: str, **numbers: object) -> Callable[[Stage], float]:
+    def bring(stage: Stage) -> float:
+        return stage.fault(name, **numbers)
+
+    return bring
+
+
+def _cut(stage: Stage) -> float:
+    stage.fault("refuse", on=True)
+    return stage.fault("drop")
+
+
+def _hang(stage: Stage) -> float:
+    """Let the servo process stand still in the middle of whatever it does."""
+    pid = stage.rider.client.pid
+    assert pid is not None, "it rides"
+    os.kill(pid, signal.SIGSTOP)
+    return monotonic()
+
+
+def _unlock(stage: Stage) -> None:
+    stage.pendant.unlock()
+
+
+def _power_up(stage: Stage) -> None:
+    stage.pendant.power_up()
+
+
+def _restart(stage: Stage) -> None:
+    stage.pendant.restart()
+
+
+def _short_freeze(stage: Stage) -> float:
+    """Freeze for less than the watchdog waits, so that what was sent meanwhile is still read by a running program."""
+    at_s = stage.fault("freeze", on=True)
+    sleep(0.06)
+    stage.fault("freeze", on=False)
+    return at_s
+
+
+_REGISTERS = ["input_int_register_0"]
+TRIALS: tuple[Trial, ...] = (
+    Trial(name="link_dropped", begin=_by("drop")),
+    Trial(
+        name="link_cut_3s_and_jogged", begin=_cut, end=_by("refuse", on=False), hold_s=3.0, is_jogged=True, bars=True,
+        is_brief=True,
+    ),
+    Trial(name="rtde_dropped", begin=_by("drop", port=30004)),
+    Trial(name="link_late_200ms", begin=_by("delay", ms=200), end=_by("delay", ms=0), begins_s=0.26),
+    Trial(name="link_late_20ms", begin=_by("delay", ms=20), end=_by("delay", ms=0), is_stop=False),
+    Trial(
+        name="interfaces_frozen_1s", begin=_by("freeze", on=True), end=_by("freeze", on=False), hold_s=1.0,
+        is_brief=True,
+    ),
+    Trial(name="interfaces_frozen_60ms", begin=_short_freeze, begins_s=0.06),
+    Trial(
+        name="all_frozen_1s", begin=_by("freeze_all", on=True), end=_by("freeze_all", on=False), hold_s=1.0,
+        begins_s=0.1,
+    ),
+    Trial(name="protective_stop", begin=_by("protective_stop"), person=_unlock, bars=True),
+    Trial(name="emergency_stop", begin=_by("estop"), end=_by("estop_release"), person=_power_up, bars=True),
+    Trial(name="safeguard_open", begin=_by("safeguard_open"), end=_by("safeguard_close"), bars=True, is_brief=True),
+    Trial(name="safety_violation", begin=_by("violation"), person=_restart, bars=True),
+    Trial(name="controller_fault", begin=_by("fault"), person=_restart, bars=True),
+    Trial(name="program_stopped", begin=_by("program_stop")),
+    Trial(name="servo_process_hung_and_jogged", begin=_hang, hold_s=0.6, is_jogged=True, is_brief=True),
+    Trial(
+        name="remote_control_off", begin=_by("remote", on=False), end=_by("remote", on=True), is_stop=False, bars=True
+    ),
+    Trial(
+        name="register_in_use", begin=_by("reserve", names=_REGISTERS), end=_by("reserve"), is_stop=False, bars=True,
+    ),
+    Trial(name="ticks_late_80ms", begin=_by("late", ms=80.0), end=_by("late"), hold_s=0.2),
+    Trial(name="ticks_late_3ms", begin=_by("late", ms=3.0, every=3), end=_by("late"), is_stop=False),
+    Trial(name="joints_noisy_1mrad", begin=_by("noise", rad=0.001), end=_by("noise"), is_stop=False),
+    Trial(name="joints_biased_300mrad", begin=_by("bias", rad=[0.3, 0, 0, 0, 0, 0]), end=_by("bias")),
+    Trial(name="joints_biased_20mrad", begin=_by("bias", rad=[0.02, 0, 0, 0, 0, 0]), end=_by("bias"), is_stop=False),
+    Trial(name="payload_3kg_too_light", begin=_by("payload", kg=3.0), end=_by("payload"), is_stop=False),
+    Trial(name="calibrated_1mm", begin=_by("calibrate", mm=1.0, mrad=1.0), end=_by("calibrate"), is_stop=False),
+    Trial(
+        name="calibrated_80mrad", begin=_by("calibrate", mm=1.0, mrad=80.0), end=_by("calibrate"), is_stop=False,
+        bars=True,
+    ),
+)  # fmt: skip
+"""In the order in which they are run; each leaves the controller as it found it."""

@@ -1,0 +1,110 @@
+"""The servo process's server on a pipe: what it says of a latch, and when it ends."""
+
+from multiprocessing import Pipe
+from threading import Thread
+
+import msgspec
+import pytest
+
+from robot.errors import ArmRefusedError, StaleStateError, WireError
+from robot.hal.fake import FakePlant
+from robot.messages import GripCommand, Heading
+from robot.servo_messages import Connect, Done, Engage, Reply, Request, Seed, Seeded, StrideReply, StrideRequest
+from robot.servo_process import ServoServer
+from robot.tick_loop import TickLoop
+from tests.support.stations import fake_rig
+
+WAIT_S = 10.0
+
+
+class DiedError(Exception):
+    """The process would have ended here."""
+
+
+class Served:
+    """A server in a thread, over a fake arm that can be made to fail."""
+
+    def __init__(self):
+        rig = fake_rig()
+        self.plant = FakePlant(arm=rig.arm, scenario=rig.scenario, rig=rig.rig)
+        self.pulse, self.ended_by = [0], None
+        self.ours, theirs = Pipe()
+        loop = TickLoop(
+            arm=self.plant.arm, config=rig.arm, scenario=rig.scenario, rule_sets=rig.rule_sets, rig=rig.rig,
+            when_latched=lambda verdict: self.server.latched(verdict),
+        )  # fmt: skip
+        self.server = ServoServer(
+            connection=theirs, plant=self.plant, loop=loop, tool=rig.arm.tool, pulse=self.pulse, die=self.die
+        )
+        self.thread = Thread(target=self.run)
+        self.thread.start()
+
+    def die(self):
+        raise DiedError
+
+    def run(self):
+        try:
+            self.server.run()
+        except DiedError:
+            self.ended_by = "death"
+        else:
+            self.ended_by = "end"
+
+    def ask(self, request: Request):
+        self.ours.send_bytes(msgspec.msgpack.encode(request))
+        return self.hear()
+
+    def hear(self):
+        assert self.ours.poll(WAIT_S)
+        return msgspec.msgpack.decode(self.ours.recv_bytes(), type=Reply)
+
+    def fail(self, error):
+        def read():
+            raise error
+
+        self.plant.arm.read = read
+
+
+@pytest.fixture
+def served():
+    made = Served()
+    made.ask(Connect())
+    assert isinstance(made.ask(Engage()), Done)
+    assert isinstance(made.ask(Seed()), Seeded)
+    yield made
+    made.ours.close()
+    made.thread.join(WAIT_S)
+
+
+LOSSES = [
+    (StaleStateError("no state"), "stale_state", "death"),
+    (ArmRefusedError("no program"), "arm_refused", "end"),
+    (WireError("no hand"), "wire", "end"),
+]
+
+
+@pytest.mark.parametrize(("error", "reason", "end"), LOSSES)
+def test_an_arm_lost_between_time_steps_is_told_unasked_and_ends_the_process(served, error, reason, end):
+    served.fail(error)
+    told = served.hear()
+    served.thread.join(WAIT_S)
+    assert isinstance(told, StrideReply)
+    assert told.stride.verdict.reason == reason
+    assert not told.stride.is_begun
+    assert served.ended_by == end
+    assert served.pulse[0] == 0
+
+
+def test_an_arm_lost_in_a_time_step_is_told_as_its_end(served):
+    grip = GripCommand(opening_m=0.085, force_n=20.0, speed_m_s=0.15)
+    intent = Heading(heading_rad=0.0, distance_m=0.01, height_m=0.2)
+    served.ours.send_bytes(
+        msgspec.msgpack.encode(StrideRequest(intent=intent, grip=grip, n_ticks=1_000_000, is_hand_busy=False))
+    )
+    assert not served.ours.poll(0.05)
+    served.fail(StaleStateError("no state"))
+    told = served.hear()
+    served.thread.join(WAIT_S)
+    assert told.stride.is_begun
+    assert told.stride.verdict.reason == "stale_state"
+    assert served.ended_by == "death"

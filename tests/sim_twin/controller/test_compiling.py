@@ -1,0 +1,26 @@
+"""The thread that makes programs of texts."""
+
+from threading import Event
+
+from sim_twin.controller.compiling import N_WAITING, Mistake, ThreadCompiler
+
+
+def test_a_flood_of_programs_is_turned_away_and_the_rest_compiled_in_order():
+    gate = Event()
+
+    def wait_for_the_gate(sockets):
+        gate.wait()
+        return {}
+
+    compiler = ThreadCompiler(wait_for_the_gate)
+    for k in range(N_WAITING + 20):
+        compiler.submit(f"def p{k}():\n  x = 1\nend\n")
+    turned_away = []
+    while (done := compiler.take()) is not None:
+        turned_away.append(done)
+    assert 19 <= len(turned_away) <= 20  # the first may be with the compiler already
+    assert all(isinstance(done, Mistake) and "wait" in done.message for done in turned_away)
+    gate.set()
+    compiler.close()
+    names = [compiler.take().name for _ in range(N_WAITING)]
+    assert names == [f"p{k}" for k in range(N_WAITING)]
