@@ -6,15 +6,16 @@ shows, if the epoch's goal can still be achieved after it.
 """
 
 from collections.abc import Iterator, Mapping
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from config.learning import SubgoalSelection
+from learning.controls import Controls, Probe, Spot, probe_of
 from learning.graph import Finding, Graph
 from learning.preconditions import START, Needs, Situation
 
-__all__ = ["Curiosity", "Probe", "Spot", "most_hopeful_step", "random_walks"]
+__all__ = ["Curiosity", "most_hopeful_step", "random_walks"]
 
 N_WALKS = 6
 FADE = 0.998
@@ -27,27 +28,7 @@ SURPRISE = 0.1
 """A result that had been given less than this chance is suspect."""
 
 
-Spot = tuple[int, Situation]
-"""A goal, and a situation in which it is tried."""
-
 NOTHING: Mapping[Spot, float] = {}
-
-
-class Probe(NamedTuple):
-    """Goals to achieve from the start of an epoch, the last of them the doubtful one."""
-
-    steps: tuple[int, ...]
-    situation: Situation
-    """In which the doubtful goal is tried, as far as it is known what gets lost on the way."""
-
-    def next_step(self, latched: int) -> int | None:
-        """Return what to try in a goal-state, or None where that is not on the way."""
-        on_the_way = 0
-        for step in self.steps:
-            if on_the_way == latched:
-                return step
-            on_the_way |= 1 << step
-        return None
 
 
 def random_walks(
@@ -101,8 +82,7 @@ class Curiosity:
         """How often probed; what stays doubtful though probed gets boring."""
         self._suspects: set[Spot] = set()
         """Where the last result was a surprise."""
-        self._old_ways: dict[int, Needs] = {}
-        """What goals were believed to need until it was revised, to be tried once more."""
+        self._controls = Controls()
         self._interest = 1.0
         """Share of the configured curiosity; fruitless probes tire it, surprises wake it."""
 
@@ -115,12 +95,12 @@ class Curiosity:
             self._probe = None
         return step
 
-    def take_in(self, finding: Finding) -> None:
+    def take_in(self, finding: Finding, graph: Graph) -> None:
         """Remember surprises, and look anew at a goal whose needs were revised."""
+        self._controls.take_in(finding, graph)
         at = (finding.goal, finding.situation)
         if finding.is_revised:
             self._tries = {key: n for key, n in self._tries.items() if key[0] != finding.goal}
-            self._old_ways[finding.goal] = finding.believed
         if finding.expected < SURPRISE:
             self._suspects.add(at)
             self._interest = min(1.0, self._interest + WAKING)
@@ -136,31 +116,16 @@ class Curiosity:
         if chance < self._config.retest:
             probe = self._retest(graph)
         elif chance < self._config.retest + self._config.curiosity * self._interest:
-            probe = self._old_way(goal, graph) or self._most_doubtful(goal, graph)
+            probe = self._controls.begin(graph, lambda probe: self._fits(probe, goal, graph)) or self._most_doubtful(
+                goal, graph
+            )
         else:
             probe = None
         if probe is None or not self._fits(probe, goal, graph):
             return None
         self._interest *= TIRING
-        at = (probe.steps[-1], probe.situation)
-        self._tries[at] = self._tries.get(at, 0.0) + graph.skill(probe.steps[-1])
+        self._tries[probe.spot] = self._tries.get(probe.spot, 0.0) + graph.skill(probe.steps[-1])
         return probe
-
-    def _old_way(self, goal: int, graph: Graph) -> Probe | None:
-        """Return a probe of a goal in the way that was believed in until lately, or None.
-
-        A goal that no longer needs what it needed may need its contrary: where a success without it came first, nothing
-        speaks for that, and nobody would provide again what seems of no use.
-        """
-        for tried, believed in sorted(self._old_ways.items()):
-            steps = graph.plan(tried, START, lambda i, g=tried, b=believed: b if i == g else graph.most_probable(i))
-            probe = Probe(steps, graph.follow(steps[:-1])) if steps else None
-            if probe is None or not graph.most_probable(tried).allow(probe.situation):
-                del self._old_ways[tried]
-            elif self._fits(probe, goal, graph):
-                del self._old_ways[tried]
-                return probe
-        return None
 
     def _most_doubtful(self, goal: int, graph: Graph) -> Probe | None:
         """Return the probe of most doubt per trial that is met on random walks, or None where there is little doubt."""
@@ -188,9 +153,7 @@ class Curiosity:
             return None
         goal, violated = literals[int(self._rng.integers(len(literals)))]
         needs, bit = graph.most_probable(goal), 1 << violated
-        others = Needs(needs.on ^ bit, needs.off ^ bit)
-        steps = graph.plan(goal, START, lambda i: others if i == goal else graph.most_probable(i))
-        return Probe(steps, graph.follow(steps[:-1])) if steps else None
+        return probe_of(goal, Needs(needs.on ^ bit, needs.off ^ bit), graph)
 
     def _doubts(self, here: Situation, graph: Graph) -> np.ndarray:
         """Return how doubtful each goal not yet achieved is, less the more often it was probed.  () -> (n,)"""
@@ -219,7 +182,7 @@ class Curiosity:
             "interest": self._interest,
             "probe": None if self._probe is None else [list(self._probe.steps), list(self._probe.situation)],
             "tries": [[goal, list(situation), n] for (goal, situation), n in self._tries.items()],
-            "old_ways": [[goal, list(needs)] for goal, needs in sorted(self._old_ways.items())],
+            "controls": self._controls.state_dict(),
             "suspects": [[goal, list(situation)] for goal, situation in sorted(self._suspects)],
         }
 
@@ -229,5 +192,5 @@ class Curiosity:
         probe = state["probe"]
         self._probe = None if probe is None else Probe(tuple(probe[0]), Situation(*probe[1]))
         self._tries = {(goal, Situation(*situation)): n for goal, situation, n in state["tries"]}
-        self._old_ways = {goal: Needs(*needs) for goal, needs in state["old_ways"]}
+        self._controls.load_state_dict(state["controls"])
         self._suspects = {(goal, Situation(*situation)) for goal, situation in state["suspects"]}

@@ -10,7 +10,7 @@ from collections.abc import Callable
 
 from config.scenario import Goal, GoalKind, Scenario
 from learning.interfaces import GoalState
-from robot.messages import ObjectPercept, Percept, StationSpec
+from robot.messages import ObjectPercept, Percept, StationSpec, Vec3
 
 __all__ = ["GoalJudge"]
 
@@ -69,9 +69,11 @@ class GoalJudge:
         if not thing.is_valid or not percept.is_in_contact:
             return False
         tool = percept.tcp_position_m
-        if math.dist(tool[:2], thing.position_m[:2]) > self._reach_m:
-            return False
-        return wanted.kind is GoalKind.PRESSED or tool[2] > thing.position_m[2] + self._tops_m[thing.name] + ABOVE_M
+        is_near = math.dist(tool[:2], thing.position_m[:2]) <= self._reach_m
+        if wanted.kind is GoalKind.PRESSED:
+            return is_near
+        is_held_up = tool[2] > thing.position_m[2] + self._tops_m[thing.name] + ABOVE_M
+        return is_held_up and (is_near or self._shares_a_box(thing.position_m, tool, percept))
 
     def held(self, percept: Percept) -> str | None:
         """Return the name of the object between the jaws of a hand that reports one."""
@@ -106,6 +108,15 @@ class GoalJudge:
         (x, y, _), (bx, by, _), (side_x, side_y) = tool, place.position_m, box.inner_m
         is_over = abs(x - bx) < side_x / 2 - WALL_MARGIN_M and abs(y - by) < side_y / 2 - WALL_MARGIN_M
         return place.is_valid and is_over and (percept.is_in_contact or tool[2] < self._reached_below_m)
+
+    def _shares_a_box(self, thing_m: Vec3, tool_m: Vec3, percept: Percept) -> bool:
+        """Whether the tool is over the same box that a thing lies in: what covers the thing is not only above it."""
+        for name, box in self._boxes.items():
+            place = self._find(name, percept)
+            (bx, by, _), (half_x, half_y) = place.position_m, (side / 2 for side in box.inner_m)
+            if place.is_valid and all(abs(x - bx) < half_x and abs(y - by) < half_y for x, y, _ in (thing_m, tool_m)):
+                return True
+        return False
 
     def _find(self, name: str, percept: Percept) -> ObjectPercept:
         i = self._index.get(name, -1)

@@ -12,7 +12,8 @@ from typing import Any
 import numpy as np
 
 from config.learning import SubgoalSelection
-from learning.curiosity import Curiosity, Spot, most_hopeful_step
+from learning.controls import Spot
+from learning.curiosity import Curiosity, most_hopeful_step
 from learning.graph import Graph, situation_of
 from learning.interfaces import Attempt, GoalState, TrialOutcome
 from learning.preconditions import Situation, mask
@@ -82,7 +83,7 @@ class GraphSelector:
         findings = self.graph.learn(attempt)
         self._remember_failure(attempt)
         for finding in findings:
-            self._curiosity.take_in(finding)
+            self._curiosity.take_in(finding, self.graph)
         revised = {i for finding in findings if finding.is_revised for i in self.graph.dependents(finding.goal)}
         self._changed = tuple(sorted(revised))
 

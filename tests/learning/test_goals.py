@@ -65,7 +65,14 @@ def test_beside_the_box_or_on_its_lid_is_not_in_it(judge, place):
 def test_held_up_over_a_shut_lid_is_being_at_the_cylinders_place(judge):
     assert judge.is_at_place(RED_GRABBED, percept(tool=(0.55, -0.24, 0.093), contact=True))
     assert not judge.is_at_place(RED_GRABBED, percept(tool=(0.55, -0.24, 0.093), contact=False))
-    assert not judge.is_at_place(RED_GRABBED, percept(tool=(0.50, -0.24, 0.093), contact=True))
+    assert judge.is_at_place(RED_GRABBED, percept(tool=(0.48, -0.24, 0.093), contact=True))
+    assert not judge.is_at_place(RED_GRABBED, percept(tool=(0.46, -0.24, 0.093), contact=True))
+
+
+def test_a_cylinder_out_of_its_box_is_covered_by_nothing_but_what_is_above_it(judge):
+    away = {"red_cylinder": (0.40, -0.10, 0.03)}
+    assert judge.is_at_place(RED_GRABBED, percept(tool=(0.41, -0.10, 0.093), contact=True, **away))
+    assert not judge.is_at_place(RED_GRABBED, percept(tool=(0.54, -0.25, 0.093), contact=True, **away))
 
 
 def test_held_up_by_the_cylinder_itself_is_a_miss_and_not_a_block(judge):
