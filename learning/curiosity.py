@@ -168,7 +168,12 @@ class Curiosity:
         return doubts
 
     def _fits(self, probe: Probe, goal: int, graph: Graph) -> bool:
-        """Whether the epoch's goal can be achieved after a probe, however that ends, within the trials."""
+        """Whether the epoch's goal can be achieved after a probe, however that ends, within the trials.
+
+        On the way to the doubtful goal it must not be: there the epoch would end.
+        """
+        if goal in probe.steps[:-1]:
+            return False
         tried = probe.steps[-1]
         for end in (probe.situation, probe.situation.after(tried, graph.undone(tried))):
             rest = () if end.latched >> goal & 1 else graph.plan(goal, end)

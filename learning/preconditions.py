@@ -221,9 +221,19 @@ class Belief:
         return float(self.probabilities @ self.allows(situation))
 
     def predict_success(self, situation: Situation) -> float:
-        """Return the chance of success in a situation: that the goal is allowed, and the skill where it is."""
+        """Return the chance of success in a situation: that the goal is allowed, and the skill where it is.
+
+        Before the first success nothing is known of the skill, and misses are the expert's: it is left out.
+        """
+        if not self.was_achieved:
+            return self.predict_allowed(situation)
         chance = (self._hits + 1.0) / (self._hits + self._misses + 2.0)
         return float(self.probabilities @ (self.allows(situation) * chance))
+
+    @property
+    def was_achieved(self) -> bool:
+        """Whether the goal was ever achieved."""
+        return bool(self._hits.any())
 
     def marginals(self) -> tuple[tuple[float, float], ...]:
         """Return for each goal the probability that it must be on, and that it must be off."""

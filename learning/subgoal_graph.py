@@ -25,6 +25,8 @@ WALK = 6
 FRESH = 0.85
 """How much of the memory of failures is left after each later trial."""
 FORGOTTEN = 0.01
+NOVICE = 0.2
+"""What a failure counts for before the first success: who tries again in the same place learns the skill there."""
 N_DRAWS = 6
 """Draws tried before a goal counts as out of reach in this goal-state."""
 
@@ -91,7 +93,8 @@ class GraphSelector:
         self._failures = {spot: FRESH * n for spot, n in self._failures.items() if n > FORGOTTEN}
         if attempt.outcome in (TrialOutcome.BLOCKED, TrialOutcome.NOT_REACHED):
             at = (attempt.subgoal, situation_of(attempt))
-            self._failures[at] = self._failures.get(at, 0.0) + 1.0
+            counted = 1.0 if self.graph.beliefs[attempt.subgoal].was_achieved else NOVICE
+            self._failures[at] = self._failures.get(at, 0.0) + counted
 
     def changed_goals(self) -> tuple[int, ...]:
         """Return the goals for which what they need, directly or not, was revised by the last update."""

@@ -1,5 +1,9 @@
 """Checkpoints keep state bit for bit and survive torn files."""
 
+import io
+import os
+import zipfile
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -92,6 +96,17 @@ def test_every_torn_or_changed_file_is_noticed():
         decode(raw[:at] + b"\x01" + raw[at + 1 :])
 
 
+def test_what_was_changed_and_packed_again_is_noticed():
+    raw = encode({"weights": np.arange(20.0), "epoch": 3})
+    changed = io.BytesIO()
+    with zipfile.ZipFile(io.BytesIO(raw)) as whole, zipfile.ZipFile(changed, "w") as archive:
+        for name in whole.namelist():
+            entry = whole.read(name)
+            archive.writestr(name, entry.replace(b'"epoch":3', b'"epoch":4') if name == "state.json" else entry)
+    with pytest.raises(CheckpointError, match="digests"):
+        decode(changed.getvalue())
+
+
 def test_only_the_last_two_checkpoints_are_kept_and_no_temporary_file_stays(tmp_path):
     store = CheckpointStore(tmp_path / "checkpoints")
     for epoch in (50, 100, 150):
@@ -119,6 +134,19 @@ def test_without_any_readable_checkpoint_the_reason_is_told(tmp_path):
     (tmp_path / "checkpoint-00000050.zip").write_bytes(b"PK")
     with pytest.raises(CheckpointError, match=r"checkpoint-00000050\.zip"):
         CheckpointStore(tmp_path).newest()
+
+
+def test_a_write_that_fails_half_way_leaves_the_old_bytes(tmp_path, monkeypatch):
+    path = tmp_path / "file"
+    write_atomically(path, b"first")
+
+    def full(_):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(os, "fsync", full)
+    with pytest.raises(OSError, match="No space"):
+        write_atomically(path, b"a longer second text")
+    assert path.read_bytes() == b"first"
 
 
 def test_an_atomic_write_replaces_the_whole_file(tmp_path):

@@ -128,6 +128,18 @@ def test_where_it_is_unknown_what_a_goal_needs_the_same_is_not_tried_all_epoch_l
     assert len(set(tried)) > 1
 
 
+def test_a_probe_never_ends_the_epoch_before_what_it_is_for():
+    selector = GraphSelector(n_goals=N, config=SubgoalSelection(curiosity=1.0), rng=np.random.default_rng(0))
+    for epoch in range(30):
+        for before in ((), (0,), (1,), (0, 1)):
+            selector.update(trial(2, before, epoch=epoch))
+    curiosity = selector._curiosity
+    probes = [curiosity._begin(0, selector.graph) for _ in range(60)]
+    begun = [probe for probe in probes if probe is not None]
+    assert begun
+    assert all(0 not in probe.steps[:-1] for probe in begun)
+
+
 def test_one_strange_success_is_overturned_by_misses_though_nothing_ever_looks_blocked():
     # Seen on the twin: jaws that held one cylinder closed on a second and carried both to the box. It counted as a
     # success without a grasp, and every empty-handed trial after it ended far from the box: not reached, not blocked.
@@ -140,6 +152,21 @@ def test_one_strange_success_is_overturned_by_misses_though_nothing_ever_looks_b
         g.learn(trial(3, (1,), outcome=NOT_REACHED, epoch=epoch, skill=0.6))
     assert g.predict_allowed(at(1))[3] < 0.3
     assert g.predict_allowed(at(1, 2))[3] > 0.7
+
+
+@pytest.mark.parametrize("outcome", [BLOCKED, NOT_REACHED])
+def test_the_same_failure_again_in_an_epoch_tells_less_than_the_first(outcome):
+    g = graph(hazard=0.0)
+    for epoch in range(4):
+        g.learn(trial(3, (1,), epoch=epoch))
+    odds = []
+    for epoch in (4, 4, 5):
+        g.learn(trial(3, (1,), outcome=outcome, epoch=epoch, skill=0.8))
+        p = g.predict_allowed(at(1))[3]
+        odds.append(np.log(p / (1.0 - p)))
+    first, again, in_another_epoch = np.diff([np.inf, *odds])[0], odds[1] - odds[0], odds[2] - odds[1]
+    assert first < again < 0.0
+    assert in_another_epoch < again
 
 
 def test_an_unskilled_experts_blocked_trial_says_less_than_a_skilled_ones():
