@@ -65,7 +65,8 @@ def most_hopeful_step(
     """
     best, best_value = goal, 0.0
     for steps, here in random_walks(start, graph, n_walks=n_walks, length=length, rng=rng):
-        value = graph.beliefs[goal].predict_success(here) / (len(steps) + 1) / (1.0 + failures.get((goal, here), 0.0))
+        chance = graph.beliefs[goal].predict_success(here) * graph.freedom(goal, here)
+        value = chance / (len(steps) + 1) / (1.0 + failures.get((goal, here), 0.0))
         if value > best_value and not (steps and goal in steps):
             best, best_value = steps[0] if steps else goal, value
     return best
@@ -164,7 +165,7 @@ class Curiosity:
                 doubts[i] = -1.0
             elif (i, here) in self._suspects:
                 doubts[i] = 0.5
-            doubts[i] /= 1.0 + self._tries.get((i, here), 0.0)
+            doubts[i] *= graph.freedom(i, here) / (1.0 + self._tries.get((i, here), 0.0))
         return doubts
 
     def _fits(self, probe: Probe, goal: int, graph: Graph) -> bool:

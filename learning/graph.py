@@ -61,6 +61,9 @@ class Graph:
         self._carried = np.zeros((n_goals, n_goals))
         self._lost = np.zeros((n_goals, n_goals))
         """[j, k]: how often goal k held when goal j was achieved, and then held no longer."""
+        self._tried = np.zeros((2, n_goals, n_goals))
+        self._reached = np.zeros((2, n_goals, n_goals))
+        """[h, i, j]: of the attempts at goal i while goal j held (h = 1) or did not, how many came to the place."""
         self._changed_epoch: list[int | None] = [None] * n_goals
         self._log = tuple(deque[Evidence](maxlen=N_EVIDENCE) for _ in range(n_goals))
         self._last: list[Evidence | None] = [None] * n_goals
@@ -81,6 +84,7 @@ class Graph:
             findings.append(self._update(tried, attempt, Kind.BLOCKED))
         elif self._config.miss_weight:
             findings.append(self._update(tried, attempt, Kind.MISSED))
+        self._count_reached(attempt)
         for i, (was_on, is_on) in enumerate(zip(attempt.state, attempt.state_after, strict=True)):
             if is_on and not was_on and i != tried:
                 findings.append(self._update(i, attempt, Kind.ACHIEVED))
@@ -90,6 +94,8 @@ class Graph:
         belief, before = self.beliefs[goal], self.most_probable(goal)
         evidence = Evidence(epoch=attempt.epoch, kind=kind, readings=_readings(goal, attempt, kind))
         weight = self._weight(evidence, is_repeated=self._last[goal] == evidence)
+        if kind is Kind.MISSED:
+            weight *= self.freedom(goal, situation_of(attempt))
         if kind is not Kind.MISSED:
             belief.expect_change(self._config.hazard, local=self._config.local_change)
             self._log[goal].append(evidence)
@@ -126,6 +132,15 @@ class Graph:
                 at = (attempt.subgoal, k)
                 self._carried[at] = (1.0 - 1.0 / N_CARRIED) * self._carried[at] + 1.0
                 self._lost[at] = (1.0 - 1.0 / N_CARRIED) * self._lost[at] + float(not holds)
+
+    def _count_reached(self, attempt: Attempt) -> None:
+        """Count whether an attempt came to its place, whatever it came to there, by what held meanwhile."""
+        tried, holds = attempt.subgoal, situation_of(attempt).holds
+        is_reached = attempt.outcome is not TrialOutcome.NOT_REACHED
+        for j in range(self.n_goals):
+            at = (holds >> j & 1, tried, j)
+            self._tried[at] = (1.0 - 1.0 / N_CARRIED) * self._tried[at] + 1.0
+            self._reached[at] = (1.0 - 1.0 / N_CARRIED) * self._reached[at] + is_reached
 
     # ----------------------------------------------------------------------------------------------------- predict
 
@@ -172,6 +187,17 @@ class Graph:
         """Return the chance that achieving goal j loses goal k.  () -> (n, n)"""
         return (self._lost + LOSS) / (self._carried + 1.0)
 
+    def freedom(self, goal: int, situation: Situation) -> float:
+        """Return how fair a try at a goal is in a situation: 1, less where what holds keeps its expert from the place.
+
+        A full hand cannot take a second thing, whatever the rules are: such a miss says little about needs, and there
+        is little to be found out by it. It is the least, over goals that hold, of the share of attempts that came to
+        the place while that one held, over the same while it did not; (reached + 2) / (tried + 2), so at first 1.
+        """
+        without, held = (self._reached[:, goal] + 2.0) / (self._tried[:, goal] + 2.0)  # (n,), (n,)
+        shares = [held[j] / without[j] for j in range(self.n_goals) if situation.holds >> j & 1]
+        return float(min([1.0, *shares]))
+
     def undone(self, goal: int) -> int:
         """Return the goals, as a bit mask, that achieving a goal is taken to lose."""
         return sum(1 << k for k, loss in enumerate(self.losses()[goal]) if loss >= 0.5)
@@ -213,6 +239,8 @@ class Graph:
             "skill": list(self._skill),
             "carried": self._carried.copy(),
             "lost": self._lost.copy(),
+            "tried": self._tried.copy(),
+            "reached": self._reached.copy(),
             "changed_epoch": list(self._changed_epoch),
             "log": [[_plain(evidence) for evidence in kept] for kept in self._log],
             "last": [None if evidence is None else _plain(evidence) for evidence in self._last],
@@ -225,6 +253,8 @@ class Graph:
         self._skill = list(state["skill"])
         self._carried = np.array(state["carried"], dtype=float)
         self._lost = np.array(state["lost"], dtype=float)
+        self._tried = np.array(state["tried"], dtype=float)
+        self._reached = np.array(state["reached"], dtype=float)
         self._changed_epoch = list(state["changed_epoch"])
         for kept, loaded in zip(self._log, state["log"], strict=True):
             kept.clear()

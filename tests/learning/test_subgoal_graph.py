@@ -140,6 +140,21 @@ def test_a_probe_never_ends_the_epoch_before_what_it_is_for():
     assert all(0 not in probe.steps[:-1] for probe in begun)
 
 
+def test_misses_of_a_full_hand_say_little_of_needs():
+    # Goal 1 keeps the hand full: goal 3 is never reached with it, though all it needs is goal 2.
+    g = graph(hazard=0.002)
+    for epoch in range(10):
+        g.learn(trial(3, (2,), epoch=epoch))
+        g.learn(trial(3, (0,), outcome=BLOCKED, epoch=epoch))
+    assert g.freedom(3, at(1)) == g.freedom(3, at(2)) == g.freedom(3, START) == 1.0
+    for epoch in range(10, 40):
+        g.learn(trial(3, (2, 1), holds=(2, 1), holds_after=(2, 1), outcome=NOT_REACHED, epoch=epoch))
+        g.learn(trial(3, (2,), epoch=epoch))
+    assert g.freedom(3, at(1)) < 0.2
+    assert g.freedom(3, at(2)) > 0.4
+    assert g.most_probable(3) == needs([2])
+
+
 def test_one_strange_success_is_overturned_by_misses_though_nothing_ever_looks_blocked():
     # Seen on the twin: jaws that held one cylinder closed on a second and carried both to the box. It counted as a
     # success without a grasp, and every empty-handed trial after it ended far from the box: not reached, not blocked.
