@@ -2,9 +2,13 @@
 
 Between intents it holds the arm at rest, so that the controller's watchdog is fed by commands that passed the gate, and
 by nothing else. When the pipe to its station closes it stops the arm and ends. After a loss of the arm it ends too: the
-client library must never get the chance to reconnect and go on by itself.
+client library must never get the chance to reconnect and go on by itself. Ctrl-C at the terminal is the station's to
+decide on: this process is in a group of its own, so that it does not vanish from under an epoch that is to be finished.
 """
 
+import os
+import signal
+import sys
 from multiprocessing.connection import Connection
 
 import msgspec
@@ -39,6 +43,7 @@ __all__ = ["ServoServer", "serve"]
 
 IDLE_S = 0.002
 """How long a process that is not in command waits for a request at a time."""
+EXIT_TERMINATED = 143
 WIRE_REASONS = (Reason.STALE_STATE.value,)
 
 
@@ -48,9 +53,13 @@ def serve(connection: Connection, resolved_json: bytes) -> None:
     Args:
         connection: the pipe to the station.
         resolved_json: everything the rig is made of.
+
+    SIGTERM stops the arm and ends it too.
     """
+    os.setpgrp()
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(EXIT_TERMINATED))
     resolved = msgspec.json.decode(resolved_json, type=Resolved)
-    plant = build_plant(rig=resolved.rig, arm=resolved.arm, scenario=resolved.scenario)
+    plant = build_plant(rig=resolved.rig, arm=resolved.arm, scenario=resolved.scenario, cell=resolved.cell)
     loop = TickLoop(
         arm=plant.arm, config=resolved.arm, scenario=resolved.scenario, rule_sets=resolved.rule_sets, rig=resolved.rig
     )
@@ -60,8 +69,8 @@ def serve(connection: Connection, resolved_json: bytes) -> None:
     except (EOFError, OSError, KeyboardInterrupt):
         pass  # the station is gone; the arm is stopped below
     finally:
+        connection.close()  # first: the station is to know at once that nobody answers any more
         loop.close()
-        connection.close()
 
 
 class ServoServer:

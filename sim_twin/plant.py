@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from config.arm import ArmConfig
+from config.cell import CellConfig
 from config.rig import Rig
 from config.scenario import Scenario
 from robot.clock import LockStepClock
@@ -270,7 +271,8 @@ class TwinResetter:
 class TwinPlant:
     """A world in MuJoCo: one arm, one table."""
 
-    def __init__(self, *, arm: ArmConfig, scenario: Scenario, rig: Rig) -> None:
+    def __init__(self, *, arm: ArmConfig, scenario: Scenario, rig: Rig, cell: CellConfig | None = None) -> None:
+        del cell  # signals are the table's own here: there are no terminals between
         self._world = TwinWorld(arm, scenario, rig)
         self.identity = PlantIdentity(kind=PlantKind.TWIN, model=arm.name, serial="twin")
         self.arm: Arm = TwinArm(self._world)

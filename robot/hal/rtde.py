@@ -16,11 +16,14 @@ from rtde_io import RTDEIOInterface
 from rtde_receive import RTDEReceiveInterface
 
 from config.arm import ArmConfig
+from config.cell import CellConfig
 from robot.errors import ArmRefusedError, NotEngagedError, RobotError, StaleStateError, WireError
 from robot.geometry import quat_of_rotation_vector
+from robot.hal.pins import Pins
 from robot.hal.robotiq import GripScale, RobotiqGripper
 from robot.hal.rtde_clock import RtdeClock
 from robot.hal.ur_checks import check_facts, check_pose
+from robot.hal.ur_outputs import changed_bits, put_output
 from robot.hal.ur_primary import read_facts
 from robot.hal.ur_state import (
     Runtime,
@@ -38,8 +41,6 @@ __all__ = ["RtdeArm"]
 RATE_HZ = 500.0
 STALE_NS = 50_000_000
 N_BITS = 16
-N_STANDARD = 8
-"""Outputs below are standard ones, the rest configurable ones of the control box."""
 WATCHDOG_HZ = 10.0
 """Commands that come less often stop the program on the controller's side."""
 PROOF_S = 0.5
@@ -52,12 +53,13 @@ START_S = 2.0
 class RtdeArm:
     """One UR5e with a Robotiq hand (robot.hal.protocols.Arm)."""
 
-    def __init__(self, *, arm: ArmConfig, address: str) -> None:
+    def __init__(self, *, arm: ArmConfig, address: str, cell: CellConfig | None = None) -> None:
         """Store. Nothing is acquired.
 
         Args:
             arm: the arm's file.
             address: host or IP address of the controller.
+            cell: where the control box has the table's signals; straight through where None.
         """
         joints = arm.joints
         self.spec = ArmSpec(
@@ -76,7 +78,9 @@ class RtdeArm:
         self._outputs: RTDEIOInterface | None = None
         self._gripper = RobotiqGripper(GripScale.of(arm.tool))
         self._last_timestamp, self._seen_ns = -1.0, 0
+        self._pins = Pins(cell)
         self._put_bits = 0
+        """Output terminals as written last."""
 
     # ----------------------------------------------------------------------------------------------------- acquire
 
@@ -147,8 +151,8 @@ class RtdeArm:
             tcp_quat=quat_of_rotation_vector(rx, ry, rz),
             tcp_force_n=(fx, fy, fz),
             grip=grip,
-            digital_in=receive.getActualDigitalInputBits() & _ALL_BITS,
-            digital_out=receive.getActualDigitalOutputBits() & _ALL_BITS,
+            digital_in=self._pins.signals_in(receive.getActualDigitalInputBits() & _ALL_BITS),
+            digital_out=self._pins.signals_out(receive.getActualDigitalOutputBits() & _ALL_BITS),
             mode=mode_of(self.status()),
         )
 
@@ -167,7 +171,10 @@ class RtdeArm:
         )  # fmt: skip
         self._require(taken, "servoJ")
         self._gripper.command(command.grip)
-        self._put_outputs(command.digital_out)
+        assert self._outputs is not None, "engage made it"
+        self._put_outputs(
+            self._outputs, self._pins.pins_out(command.digital_out, self._put_bits, now_ns=monotonic_ns())
+        )
 
     def stop(self) -> bool:
         """Bring the arm to rest and give up command; the hand keeps its grip. Returns whether rest was seen."""
@@ -267,6 +274,7 @@ class RtdeArm:
             self.clock.wait_tick()
         self._outputs = RTDEIOInterface(self.address)
         self._put_bits = receive.getActualDigitalOutputBits() & _ALL_BITS
+        self._pins.forget()
         if not self._gripper.is_active:
             self._gripper.activate()
         # From here on somebody must write: a command every 100 ms at least, or the program ends.
@@ -282,23 +290,15 @@ class RtdeArm:
             with suppress(RuntimeError):
                 control.disconnect()
         if outputs is not None:
+            with suppress(RuntimeError, ArmRefusedError):
+                self._put_outputs(outputs, self._pins.rested(self._put_bits))
             with suppress(RuntimeError):
                 outputs.disconnect()
 
-    def _put_outputs(self, digital_out: int) -> None:
-        changed = self._put_bits ^ digital_out
-        for i in range(N_BITS):
-            if changed >> i & 1:
-                self._put_output(i, is_on=bool(digital_out >> i & 1))
-        self._put_bits = digital_out
-
-    def _put_output(self, i: int, *, is_on: bool) -> None:
-        assert self._outputs is not None, "engage made it"
-        if i < N_STANDARD:
-            taken = self._outputs.setStandardDigitalOut(i, is_on)
-        else:
-            taken = self._outputs.setConfigurableDigitalOut(i - N_STANDARD, is_on)
-        self._require(taken, f"digital output {i}")
+    def _put_outputs(self, outputs: RTDEIOInterface, pins: int) -> None:
+        for i in changed_bits(self._put_bits, pins):
+            self._require(put_output(outputs, i, is_high=bool(pins >> i & 1)), f"digital output {i}")
+        self._put_bits = pins
 
     def _require(self, is_taken: bool, what: str) -> None:
         if not is_taken:

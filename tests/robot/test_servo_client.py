@@ -6,8 +6,11 @@ import signal
 import msgspec
 import pytest
 
+from perception.ground_truth import GroundTruthPerception
 from robot.errors import NotEngagedError, RobotConfigError, SafetyError, WireError
-from robot.messages import GripCommand, Heading, PlantKind
+from robot.local_station import LocalStation
+from robot.messages import GripCommand, Heading, PlantKind, StationMode
+from robot.rigs import build_plant
 from robot.servo_client import ServoClient
 from tests.support.stations import fake_rig
 
@@ -61,13 +64,60 @@ def test_a_process_that_was_killed_is_said_and_a_new_one_starts_without_command(
     client.engage()
     client.seed()
     os.kill(client.pid, signal.SIGKILL)
-    with pytest.raises(WireError, match="ended"):
-        stride(client, go())
+    came = stride(client, go())
+    assert came.verdict.is_latched
+    assert "ended" in came.verdict.detail
+    assert not came.is_begun
+    assert client.is_lost
     with pytest.raises(NotEngagedError, match="connect"):
         client.seed()
+    with pytest.raises(NotEngagedError, match="connect"):
+        stride(client, go())
     client.connect()
     with pytest.raises(SafetyError, match="engage"):
         stride(client, go())
+
+
+def test_a_question_that_a_person_broke_in_on_leaves_no_process_behind(client, monkeypatch):
+    client.engage()
+    client.seed()
+    pid = client.pid
+
+    def break_in(timeout_s):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(client._connection, "poll", break_in, raising=False)
+    with pytest.raises(KeyboardInterrupt):
+        stride(client, go())
+    client.close()
+    with pytest.raises(ProcessLookupError):
+        os.kill(pid, 0)
+
+
+def test_a_station_whose_servo_process_is_gone_latches_and_a_reset_does_not_take_the_arm_again():
+    resolved = fake_rig()
+    plant = build_plant(rig=resolved.rig, arm=resolved.arm, scenario=resolved.scenario)
+    client = ServoClient(resolved)
+    perception = GroundTruthPerception(scenario=resolved.scenario, arm=resolved.arm)
+    station = LocalStation(
+        world=plant, loop=client, perception=perception, arm=resolved.arm, scenario=resolved.scenario, rig=resolved.rig
+    )
+    with station:
+        station.arm(by="the test")
+        station.engage()
+        os.kill(client.pid, signal.SIGKILL)
+        assert station.step(go()).is_void
+        assert station.state.mode is StationMode.LATCHED
+        with pytest.raises(NotEngagedError):
+            station.reset(seed=0, epoch=0)
+        station.reset_plant(seed=0, epoch=0)
+        station.clear_latch(by="the test")
+        station.engage()
+        os.kill(client.pid, signal.SIGKILL)
+        os.waitid(os.P_PID, client.pid, os.WEXITED | os.WNOWAIT)
+        with pytest.raises(NotEngagedError):
+            station.reset(seed=0, epoch=1)
+        assert station.state.mode is StationMode.LATCHED
 
 
 def test_an_error_of_the_process_is_raised_here_by_its_kind():
