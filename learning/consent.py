@@ -53,7 +53,7 @@ class Consent:
         work = workload_of(resolved, n_done=n_done, changes=changes_of(resolved.scenario), steps_done=steps_done)
         for line in _told(resolved, work):
             typer.echo(line, err=True)
-        typer.echo("Enter goes on, Ctrl-C leaves: ", nl=False, err=True)
+        typer.echo("Enter goes on, Ctrl-C leaves", err=True)
         if not sys.stdin.readline():
             raise LearningError("expected a person's key before the arm is taken, the input has ended: nothing moved")
 

@@ -135,7 +135,7 @@ def _take_up(
 
 
 def _assemble(folder: RunFolder, resolved: Resolved, seed: int, stopwatch: Stopwatch) -> Session:
-    learner = RobotLearner(resolved, seed=seed, stopwatch=stopwatch)
+    learner = RobotLearner(resolved, seed=seed, stopwatch=stopwatch, pictures=folder.path / "resets")
     manifest = manifest_of(
         resolved,
         seed=seed,

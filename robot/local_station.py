@@ -137,6 +137,7 @@ class LocalStation:
             table_height_m=table_m,
         )
         self._percept: Percept
+        self._measured: ArmState
         self._is_connected = False
 
     def __enter__(self) -> "LocalStation":
@@ -250,7 +251,7 @@ class LocalStation:
         percept = self._perception.perceive(state, None if truth is None else truth.read())
         if self._loop.is_in_contact:
             percept = msgspec.structs.replace(percept, is_in_contact=True)
-        self._percept = percept
+        self._percept, self._measured = percept, state
         return percept
 
     def _result(self, stride: Stride, duration_s: float) -> StepResult:

@@ -3,6 +3,7 @@
 import inspect
 from collections.abc import Callable
 from importlib import import_module
+from pathlib import Path
 from typing import Any
 
 from config.arm import ArmConfig
@@ -41,20 +42,27 @@ def build_plant(*, rig: Rig, arm: ArmConfig, scenario: Scenario, cell: CellConfi
 
 
 def build_station(
-    resolved: Resolved, *, plant: Plant | None = None, heard_by: Callable[[str], None] | None = None
+    resolved: Resolved,
+    *,
+    plant: Plant | None = None,
+    heard_by: Callable[[str], None] | None = None,
+    pictures: Path = Path("resets"),
 ) -> LocalStation:
     """Return the station of a resolved config, disarmed and not yet connected.
 
     Args:
         resolved: Rig, arm, scenario and rule sets.
         plant: One that is already made, in place of the rig's.
+        pictures: Folder for what a person who lays the table out needs to see.
         heard_by: A stopwatch's lap that hears of every tick, where the arm is held in this process.
     """
     rig, arm, scenario = resolved.rig, resolved.arm, resolved.scenario
     check_usable(rig)
     perception = _make(_require_perception(rig), "perception", scenario=scenario, arm=arm)
     if rig.bus is not None and plant is None:
-        return load("robot.lab:build_lab_station")(resolved, perception)  # brings the bus, which lock-step never needs
+        return load("robot.lab:build_lab_station")(
+            resolved, perception, pictures=pictures
+        )  # brings the bus, which lock-step never needs
     world = build_plant(rig=rig, arm=arm, scenario=scenario, cell=resolved.cell) if plant is None else plant
     if heard_by is not None:
         time_world(world, heard_by)

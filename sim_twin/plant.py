@@ -15,6 +15,7 @@ from robot.clock import LockStepClock
 from robot.errors import NotEngagedError, StaleStateError
 from robot.hal.protocols import Arm, Camera, Clock, Resetter, SceneTruth
 from robot.kinematics import Kinematics
+from robot.layout import Layout, draw_layout
 from robot.messages import (
     ArmCommand,
     ArmMode,
@@ -29,7 +30,6 @@ from robot.messages import (
     Vec3,
     Vec6,
 )
-from sim_twin.layout import Layout, draw_layout
 from sim_twin.names import on_table
 from sim_twin.scene import build_scene
 from sim_twin.table import TableDrive

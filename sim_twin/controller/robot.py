@@ -9,6 +9,7 @@ import numpy as np
 from config.cell import CellConfig
 from config.loader import resolve
 from robot.kinematics import Kinematics
+from robot.layout import draw_layout
 from sim_twin.controller.box import Box
 from sim_twin.controller.builtins import program_builtins
 from sim_twin.controller.compiling import Compiler, InlineCompiler, MakeBuiltins
@@ -22,7 +23,6 @@ from sim_twin.controller.program import Programs
 from sim_twin.controller.states import Event, RobotMode, RuntimeState
 from sim_twin.controller.watchdogs import WatchdogAction
 from sim_twin.controller.wire import ControllerVersion, ScriptSource
-from sim_twin.layout import draw_layout
 from sim_twin.plant import TwinWorld
 
 __all__ = ["VirtualRobot", "make_world"]

@@ -2,12 +2,18 @@
 
 import csv
 import os
+import re
 import signal
+import subprocess
 import time
 
+import msgspec
+import numpy as np
 import pytest
 
+from config.loader import load_arm
 from learning.run_folder import RunFolder
+from robot.bus import RESET, ResetRequest, open_session, topic
 from tests.support.small_lab import SERIAL, autotelic, children_of, controller_of, make_lab, start
 
 HOST = "127.0.0.61"
@@ -19,6 +25,14 @@ def lab(tmp_path_factory):
     make_lab(folder, HOST)
     with controller_of(folder, HOST) as controller:
         yield folder, controller
+
+
+@pytest.fixture
+def lab_by_person(tmp_path):
+    host = "127.0.0.63"
+    make_lab(tmp_path, host, reset="person")
+    with controller_of(tmp_path, host) as controller:
+        yield tmp_path, controller, host
 
 
 def until(is_true, timeout_s=30.0):
@@ -109,3 +123,45 @@ def test_workers_are_refused_where_there_is_one_arm(lab):
     code, _, said = autotelic(lab[0], *learn("workers", "--workers", "1"))
     assert (code, said.count("\n")) == (2, 1)
     assert "--workers" in said
+
+
+@pytest.mark.slow
+def test_a_person_lays_the_table_out_while_the_arm_is_parked_and_disarmed(lab_by_person):
+    folder, controller, host = lab_by_person
+    home = np.array(load_arm("ur5e").home_rad)
+    process = start(folder, *learn("run", "--epochs", "1"), stdin=subprocess.PIPE)
+    session = open_session(f"tcp/{host}:7447", is_hub=False)
+    said, parked_rad = [], []
+    try:
+        for line in process.stderr:
+            said.append(line)
+            if "Enter" not in line:
+                continue
+            asked = re.search(r"epoch (\d+), seed (\d+), as in (\S+);", line)
+            if asked:
+                truth = controller.fault("truth")
+                assert truth["runtime"] == "STOPPED", "a person reaches in: nobody may be in command"
+                parked_rad.append(np.abs(np.array(truth["q_rad"]) - home).max())
+                assert (folder / asked[3]).read_bytes()[:4] == b"\x89PNG"
+                last = asked
+            elif "put right" in line:
+                payload = msgspec.json.encode(ResetRequest(seed=int(last[2]), epoch=int(last[1]), digital_out=0))
+                (reply,) = session.get(topic(SERIAL, RESET), payload=payload, timeout=10.0)
+                assert reply.err is None
+                time.sleep(0.1)
+            process.stdin.write("\n")
+            process.stdin.flush()
+        code = process.wait(timeout=20)
+    finally:
+        process.kill()
+        process.communicate()
+        session.close()
+    text = "".join(said)
+    assert code == 0, text
+    assert "robot-hours: at most" in text
+    assert "resets by a person: 3, of which 2 for evaluations" in text
+    assert len(re.findall(r"not in place: \w+: \d+ mm off", text)) >= 3
+    assert len(parked_rad) == 3
+    assert max(parked_rad) < 0.02
+    assert len(list((folder / "run" / "resets").glob("*.png"))) == 3
+    assert_at_rest(controller)
