@@ -16,8 +16,9 @@ from config.resolved import Resolved
 from config.rig import Rig
 from config.scenario import Scenario
 from robot.cell_check import Finding, Somebody, Wire, check_cell_wires
-from robot.errors import RobotConfigError, SafetyError
+from robot.errors import RobotConfigError
 from robot.hal.pins import straight_cell
+from robot.hal.ur_checks import check_serial
 from robot.rigs import check_usable
 
 __all__ = ["app"]
@@ -66,11 +67,7 @@ def _walk(resolved: Resolved, *, is_auto: bool) -> list[Finding]:
     with ExitStack() as stack:
         somebody = stack.enter_context(_truth_of(rig)) if is_auto else _Person()
         terminals = stack.enter_context(UrTerminals(rig.address))
-        if terminals.serial != rig.expected.serial:
-            raise SafetyError(
-                f"rig {rig.name}: expected the arm with serial {rig.expected.serial}, found {terminals.serial} at "
-                f"{rig.address}: another arm's wires are not touched"
-            )
+        check_serial(terminals.serial, rig.expected.serial, rig.address)
         inputs, outputs = wires_of(resolved.scenario, cell)
         return check_cell_wires(
             cell=cell,

@@ -22,7 +22,7 @@ from robot.geometry import quat_of_rotation_vector
 from robot.hal.pins import Pins
 from robot.hal.robotiq import GripScale, RobotiqGripper
 from robot.hal.rtde_clock import RtdeClock
-from robot.hal.ur_checks import check_facts, check_pose
+from robot.hal.ur_checks import check_facts, check_pose, check_serial
 from robot.hal.ur_outputs import changed_bits, put_output
 from robot.hal.ur_primary import read_facts
 from robot.hal.ur_state import (
@@ -53,12 +53,15 @@ START_S = 2.0
 class RtdeArm:
     """One UR5e with a Robotiq hand (robot.hal.protocols.Arm)."""
 
-    def __init__(self, *, arm: ArmConfig, address: str, cell: CellConfig | None = None) -> None:
+    def __init__(
+        self, *, arm: ArmConfig, address: str, serial: str | None = None, cell: CellConfig | None = None
+    ) -> None:
         """Store. Nothing is acquired.
 
         Args:
             arm: the arm's file.
             address: host or IP address of the controller.
+            serial: the number that it must say it has; None takes any.
             cell: where the control box has the table's signals; straight through where None.
         """
         joints = arm.joints
@@ -71,7 +74,7 @@ class RtdeArm:
         self.address = address
         self.serial = ""
         """As the controller says, from connect() on."""
-        self._arm = arm
+        self._arm, self._expected_serial = arm, serial
         self._receive: RTDEReceiveInterface | None = None
         self._dashboard: DashboardClient | None = None
         self._control: RTDEControlInterface | None = None
@@ -89,7 +92,7 @@ class RtdeArm:
 
         Raises:
             WireError: somebody does not answer.
-            RobotConfigError: another model or software than this backend is for.
+            RobotConfigError: another arm than the rig names, another model or software than this backend is for.
         """
         if self._receive is not None:
             return
@@ -98,12 +101,14 @@ class RtdeArm:
         with _named("dashboard", self.address):
             dashboard.connect()
             version = parse_version(dashboard.polyscopeVersion())
+            self.serial = dashboard.getSerialNumber().strip()
+        if self._expected_serial is not None:
+            check_serial(self.serial, self._expected_serial, self.address)
         check_version(version)
         check_facts(facts, self._arm)
         check_pose(facts)
         with _named("RTDE", self.address):
             self._receive = RTDEReceiveInterface(self.address, RATE_HZ)
-            self.serial = dashboard.getSerialNumber().strip()
         self._dashboard = dashboard
         self._gripper.connect(self.address)
         self.clock.pace_by(self._receive)

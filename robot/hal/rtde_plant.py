@@ -30,7 +30,7 @@ class RtdePlant:
         if round(rig.tick_s * 1e9) != TICK_NS:
             raise RobotConfigError(f"rig {rig.name}: expected tick_s 0.002, as the arm's, came {rig.tick_s}")
         self._kind, self._scenario = kind_of_address(rig.address), scenario
-        self.arm = RtdeArm(arm=arm, address=rig.address, cell=cell)
+        self.arm = RtdeArm(arm=arm, address=rig.address, serial=rig.expected.serial, cell=cell)
         self.cameras: Mapping[str, Camera] = {}
         self.truth: SceneTruth | None = None
         self.resetter: Resetter

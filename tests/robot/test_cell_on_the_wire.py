@@ -8,6 +8,7 @@ import yaml
 from config.loader import resolve
 from robot.bus.virtual_table import VirtualSomebody
 from robot.cell_check import Wire
+from robot.errors import RobotConfigError
 from robot.hal.rtde_plant import RtdePlant
 from robot.messages import GripCommand
 from robot.tick_loop import TickLoop
@@ -93,14 +94,21 @@ def test_wrong_polarity_swapped_pins_and_a_missing_coil_are_each_named(lab):
     assert verdicts["chest lid"] == "never seen off"
 
 
-def test_another_arms_wires_are_not_touched(lab):
-    folder, _ = lab
+def test_an_arm_with_another_serial_is_refused_and_its_wires_are_not_touched(lab):
+    folder, controller = lab
     rig = yaml.safe_load((folder / "rig.yaml").read_text())
     rig["expected"]["serial"] = "20190000001"
     (folder / "other.yaml").write_text(yaml.safe_dump(rig))
+    before = controller.fault("truth")["digital_out"]
     code, _, said = autotelic(folder, "cell", "test", "--rig", "other.yaml", "--scenario", "small.yaml")
-    assert (code, said.count("\n")) == (1, 1)
+    assert (code, said.count("\n")) == (2, 1)
     assert "serial 20190000001" in said
+    assert controller.fault("truth")["digital_out"] == before
+    resolved = resolve(rig=folder / "other.yaml", scenario=folder / "small.yaml")
+    plant = RtdePlant(arm=resolved.arm, scenario=resolved.scenario, rig=resolved.rig, cell=resolved.cell)
+    with pytest.raises(RobotConfigError, match=f"serial 20190000001.*{SERIAL} at {HOST}"):
+        plant.arm.connect()
+    plant.arm.close()
 
 
 def test_the_cell_program_sees_the_button_and_drives_lamp_and_lid_through_these_wires(lab):
