@@ -292,13 +292,14 @@ class RtdeArm:
         if control is not None:
             with suppress(RuntimeError):
                 control.stopScript()
-            with suppress(RuntimeError):
-                control.disconnect()
         if outputs is not None:
             with suppress(RuntimeError, ArmRefusedError):
                 self._put_outputs(outputs, self._pins.rested(self._put_bits))
             with suppress(RuntimeError):
                 outputs.disconnect()
+        if control is not None:
+            with suppress(RuntimeError):
+                control.disconnect()
 
     def _put_outputs(self, outputs: RTDEIOInterface, pins: int) -> None:
         for i in changed_bits(self._put_bits, pins):

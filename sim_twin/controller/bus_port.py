@@ -1,7 +1,7 @@
 """The twin on the bus: its truth 100 times a second, and resets of its table. Polled by the controller's loop.
 
 Whoever resets the table of a cell also looks after an arm that has stopped: a protective stop is unlocked, when five
-seconds have passed since, before the table is laid out. Other stops stay: they are the client's test's own.
+seconds have passed since, and the program that it interrupted is ended, before the table is laid out. Other stops stay.
 """
 
 import msgspec
@@ -10,6 +10,7 @@ import zenoh
 from robot.bus import CELL, RESET, TRUTH, CellAction, ResetRequest, open_session, topic
 from robot.messages import SceneState
 from sim_twin.controller.robot import VirtualRobot
+from sim_twin.controller.states import RuntimeState
 from sim_twin.controller.table_hands import TableHands
 from sim_twin.controller.wire.dashboard_target import Outcome
 from sim_twin.plant import TwinTruth
@@ -18,6 +19,8 @@ __all__ = ["BusPort"]
 
 TRUTH_SLICES = 5
 N_WAITING = 8
+PATIENCE_SLICES = 500
+"""How long a program may take to end after it was stopped at the pendant."""
 
 
 class BusPort:
@@ -44,6 +47,7 @@ class BusPort:
         self._cell_key = topic(serial, CELL)
         self._actions = self._session.declare_queryable(self._cell_key, zenoh.handlers.FifoChannel(N_WAITING))
         self._hands = TableHands(robot.machine.world)
+        self._n_patience = 0
         self._asked: zenoh.Query | None = None
         """A reset that waits for the arm to be unlocked."""
         self._encode = msgspec.json.Encoder().encode
@@ -68,10 +72,18 @@ class BusPort:
         return self._truth.read()
 
     def _answer(self, query: zenoh.Query) -> None:
-        robot = self._robot
-        if robot.machine.modes.is_stopped_by_safety and robot.panel.unlock_protective_stop() is Outcome.TOO_EARLY:
+        robot, modes = self._robot, self._robot.machine.modes
+        if modes.is_stopped_by_safety:
+            if robot.panel.unlock_protective_stop() is Outcome.TOO_EARLY:
+                self._asked = query
+                return
+            robot.panel.stop()
+            self._n_patience = PATIENCE_SLICES
+        if self._n_patience and modes.runtime is not RuntimeState.STOPPED:
             self._asked = query
+            self._n_patience -= 1
             return
+        self._n_patience = 0
         with query:
             try:
                 asked = msgspec.json.decode(_payload(query), type=ResetRequest)

@@ -119,6 +119,24 @@ def test_a_second_ctrl_c_ends_it_at_once(lab):
     assert (code, "stopped at once" in said) == (130, True), said
 
 
+@pytest.mark.slow
+def test_a_run_outlives_a_protective_stop_as_the_virtual_tables_reset_unlocks_it(lab):
+    folder, controller = lab
+    with start(folder, *learn("stopped")) as process:
+        try:
+            until(lambda: process.poll() is not None or epochs_of(folder / "stopped"))
+            until(lambda: controller.fault("truth")["runtime"] == "PLAYING")
+            controller.fault("protective_stop")
+            _, said = process.communicate(timeout=70)
+        finally:
+            process.kill()
+    assert process.returncode == 0, said
+    assert epochs_of(folder / "stopped") == [0, 1, 2]
+    with (folder / "stopped" / "goals.csv").open() as rows:
+        assert sum(int(row["is_void"]) for row in csv.DictReader(rows)) <= 1
+    assert_at_rest(controller)
+
+
 def test_workers_are_refused_where_there_is_one_arm(lab):
     code, _, said = autotelic(lab[0], *learn("workers", "--workers", "1"))
     assert (code, said.count("\n")) == (2, 1)

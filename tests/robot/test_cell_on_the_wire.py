@@ -1,6 +1,8 @@
 """A cell wired in another way than straight through, on the wire: the table's signals arrive as the cell file says."""
 
 import json
+import re
+import subprocess
 
 import pytest
 import yaml
@@ -12,7 +14,7 @@ from robot.errors import RobotConfigError
 from robot.hal.rtde_plant import RtdePlant
 from robot.messages import GripCommand
 from robot.tick_loop import TickLoop
-from tests.support.small_lab import SERIAL, autotelic, controller_of, make_lab
+from tests.support.small_lab import SERIAL, autotelic, controller_of, make_lab, start
 
 HOST = "127.0.0.62"
 CELL = """\
@@ -109,6 +111,37 @@ def test_an_arm_with_another_serial_is_refused_and_its_wires_are_not_touched(lab
     with pytest.raises(RobotConfigError, match=f"serial 20190000001.*{SERIAL} at {HOST}"):
         plant.arm.connect()
     plant.arm.close()
+
+
+@pytest.mark.slow
+def test_a_person_is_asked_for_each_wire_and_believed(lab):
+    folder, _ = lab
+    with start(
+        folder, "cell", "test", "--rig", "rig.yaml", "--scenario", "small.yaml", stdin=subprocess.PIPE
+    ) as process:
+        try:
+            with VirtualSomebody(f"tcp/{HOST}:7447", SERIAL) as hand:
+                process.stdin.write("\ny\ny\n" + "\nn\ny\n" + "\ny\ny\n")
+                process.stdin.flush()
+                asked = ""
+                for words, name in (
+                    ("left_button", "left_button"),
+                    ("right_button", "right_button"),
+                    ("chest", "chest"),
+                ):
+                    for is_on, verb in ((True, r"(press and hold|put a cylinder into)"), (False, r"(let go of|empty)")):
+                        while not re.search(f"{verb} {words}", asked):
+                            letter = process.stderr.read(1)
+                            assert letter, asked
+                            asked += letter
+                        hand._act(Wire(signal=0, name=name, what="button", pin=""), is_on=is_on)
+            out, _ = process.communicate(timeout=30)
+        finally:
+            process.kill()
+    assert process.returncode == 1
+    verdicts = [line for line in out.splitlines() if re.search(r"(button|sensor|lamp|lid) ", line)]
+    assert ["ok" in line for line in verdicts] == [True, True, True, True, False, True], out
+    assert "never seen on" in verdicts[4]
 
 
 def test_the_cell_program_sees_the_button_and_drives_lamp_and_lid_through_these_wires(lab):
