@@ -88,6 +88,8 @@ class StrideReply(_Tagged, frozen=True, kw_only=True):
     """What the time step came to."""
 
     stride: Stride
+    is_asked: bool = True
+    """It answers a request; otherwise it tells what latched between time steps."""
 
 
 class Done(_Tagged, frozen=True, kw_only=True):

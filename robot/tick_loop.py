@@ -84,6 +84,11 @@ class TickLoop:
         """Whether something holds the tool up."""
         return self._mover.is_in_contact
 
+    @property
+    def why_lost(self) -> str | None:
+        """Nothing: what runs in this process cannot end without it, and latches only in a time step."""
+        return None
+
     def connect(self) -> None:
         """Acquire the arm. Moves nothing."""
         self._arm.connect()
@@ -91,6 +96,10 @@ class TickLoop:
     def engage(self) -> None:
         """Take command of the arm, after somebody has armed it."""
         self._arm.engage()
+
+    def stop(self) -> None:
+        """Stop the arm; it must be seeded again before anything moves."""
+        self._arm.stop()
 
     def close(self) -> None:
         """Stop and release the arm. Idempotent, never raises."""

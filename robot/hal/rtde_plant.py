@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 
 from config.arm import ArmConfig
+from config.cell import CellConfig
 from config.rig import Rig
 from config.scenario import Scenario
 from robot.errors import RobotConfigError
@@ -18,7 +19,7 @@ __all__ = ["RtdePlant"]
 class RtdePlant:
     """A UR5e at an address: real, or a virtual controller on this machine's loopback."""
 
-    def __init__(self, *, arm: ArmConfig, scenario: Scenario, rig: Rig) -> None:
+    def __init__(self, *, arm: ArmConfig, scenario: Scenario, rig: Rig, cell: CellConfig | None = None) -> None:
         """Store. Nothing is acquired.
 
         Raises:
@@ -29,7 +30,7 @@ class RtdePlant:
         if round(rig.tick_s * 1e9) != TICK_NS:
             raise RobotConfigError(f"rig {rig.name}: expected tick_s 0.002, as the arm's, came {rig.tick_s}")
         self._kind, self._scenario = kind_of_address(rig.address), scenario
-        self.arm = RtdeArm(arm=arm, address=rig.address)
+        self.arm = RtdeArm(arm=arm, address=rig.address, serial=rig.expected.serial, cell=cell)
         self.cameras: Mapping[str, Camera] = {}
         self.truth: SceneTruth | None = None
         self.resetter: Resetter

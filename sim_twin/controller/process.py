@@ -10,6 +10,7 @@ from typing import Self
 
 import msgspec
 
+from config.errors import ConfigError
 from sim_twin.controller.control_port import CONTROL
 from sim_twin.controller.server import ControllerServer, Setup
 
@@ -133,7 +134,7 @@ def _serve(setup: bytes, line: Connection) -> None:
         server = ControllerServer(msgspec.json.decode(setup, type=Setup))
         with server:
             server.run(when_ready=lambda: line.send_bytes(_READY), is_over=line.poll)
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, ConfigError) as error:
         line.send_bytes(str(error).encode())
     except KeyboardInterrupt:
         pass
