@@ -30,6 +30,7 @@ from robot.servo_messages import (
     Stop,
     StrideReply,
     StrideRequest,
+    pack_intent,
 )
 from robot.servo_process import serve
 from robot.tick_loop import Stride
@@ -121,7 +122,7 @@ class ServoClient:
         Raises:
             WireError: the process hangs or has ended; it is gone now.
         """
-        request = StrideRequest(intent=intent, grip=grip, n_ticks=n_ticks, is_hand_busy=is_hand_busy)
+        request = StrideRequest(intent=pack_intent(intent), grip=grip, n_ticks=n_ticks, is_hand_busy=is_hand_busy)
         stride = self._ask(request, StrideReply, n_ticks * self._tick_s + STRIDE_SLACK_S).stride
         self.is_in_contact = stride.is_in_contact
         return stride

@@ -32,6 +32,7 @@ from robot.servo_messages import (
     Stop,
     StrideReply,
     StrideRequest,
+    unpack_intent,
 )
 from robot.tick_loop import TickLoop
 
@@ -129,7 +130,8 @@ class ServoServer:
             self._send(Failure(kind=SafetyError.__name__, message="expected an engaged arm; engage and seed it first"))
             return
         self._grip = request.grip
-        verdict = self._loop.begin(request.intent, n_ticks=request.n_ticks, is_hand_busy=request.is_hand_busy)
+        intent = unpack_intent(request.intent)
+        verdict = self._loop.begin(intent, n_ticks=request.n_ticks, is_hand_busy=request.is_hand_busy)
         if verdict is None:
             self._n_left = request.n_ticks
             return

@@ -74,11 +74,14 @@ class RobotiqGripper:
         self.state: GripState | None = None
 
     def connect(self, host: str, *, timeout_s: float = 2.0) -> None:
-        """Open the connection. Moves nothing.
+        """Open the connection; what was said on one before counts no more. Moves nothing.
 
         Raises:
             WireError: nobody listens there.
         """
+        self._received = self._outgoing = b""
+        self._said.clear()
+        self._asked, self._is_query_out, self._n_silent, self.state = None, False, 0, None
         try:
             self._socket = socket.create_connection((host, GRIPPER_PORT), timeout=timeout_s)
         except OSError as error:

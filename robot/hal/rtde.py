@@ -18,6 +18,7 @@ from rtde_receive import RTDEReceiveInterface
 from config.arm import ArmConfig
 from robot.errors import ArmRefusedError, NotEngagedError, RobotError, StaleStateError, WireError
 from robot.geometry import quat_of_rotation_vector
+from robot.hal.protocols import Clock
 from robot.hal.robotiq import GripScale, RobotiqGripper
 from robot.hal.rtde_clock import RtdeClock
 from robot.hal.ur_checks import check_facts, check_pose
@@ -65,7 +66,8 @@ class RtdeArm:
             q_min_rad=_vec6([j.range_rad[0] for j in joints]), q_max_rad=_vec6([j.range_rad[1] for j in joints]),
             qd_max_rad_s=_vec6([j.speed_rad_s for j in joints]), grip_stroke_m=arm.tool.stroke_m,
         )  # fmt: skip
-        self.clock = RtdeClock()
+        self._pace = RtdeClock()
+        self.clock: Clock = self._pace
         self.address = address
         self.serial = ""
         """As the controller says, from connect() on."""
@@ -102,7 +104,7 @@ class RtdeArm:
             self.serial = dashboard.getSerialNumber().strip()
         self._dashboard = dashboard
         self._gripper.connect(self.address)
-        self.clock.pace_by(self._receive)
+        self._pace.pace_by(self._receive)
         self._wait_first_state()
 
     def engage(self) -> None:
@@ -120,7 +122,8 @@ class RtdeArm:
         try:
             self._set_up(self._control, receive)
         except (RobotError, RuntimeError):
-            self._drop_control()  # an arm that was set up by half is nobody's: the next engage begins anew
+            # An arm that was set up by half is nobody's: the next engage begins anew.
+            self._drop_control(is_in_traceback=True)
             raise
 
     # ------------------------------------------------------------------------------------------------ read and write
@@ -183,10 +186,8 @@ class RtdeArm:
         if self._receive is None:
             return
         self.stop()
-        self.clock.pace_by(None)
-        receive, dashboard, self._receive, self._dashboard = self._receive, self._dashboard, None, None
-        with suppress(RuntimeError):
-            receive.disconnect()
+        self._pace.pace_by(None)
+        dashboard, self._receive, self._dashboard = self._dashboard, None, None  # see _drop_control
         with suppress(RuntimeError):
             if dashboard is not None:
                 dashboard.disconnect()
@@ -243,8 +244,7 @@ class RtdeArm:
         while monotonic_ns() < deadline_ns:
             self.clock.wait_tick()
             if self.status().runtime == Runtime.STOPPED:
-                control.disconnect()
-                return
+                return  # the client disconnects as it is dropped
         control.stopScript()
         control.disconnect()
         raise ArmRefusedError(
@@ -272,15 +272,20 @@ class RtdeArm:
         # From here on somebody must write: a command every 100 ms at least, or the program ends.
         self._require(control.setWatchdog(WATCHDOG_HZ), "setWatchdog")
 
-    def _drop_control(self) -> None:
-        """End the program and forget its client: it must never get the chance to go on by itself."""
+    def _drop_control(self, *, is_in_traceback: bool = False) -> None:
+        """End the program and forget its client: it must never get the chance to go on by itself.
+
+        A client disconnects when its last reference goes, and sleeps half a second each time it does. So it is told to
+        only where a traceback keeps it alive.
+        """
         control, self._control = self._control, None
         outputs, self._outputs = self._outputs, None
         if control is not None:
             with suppress(RuntimeError):
                 control.stopScript()
-            with suppress(RuntimeError):
-                control.disconnect()
+            if is_in_traceback:
+                with suppress(RuntimeError):
+                    control.disconnect()
         if outputs is not None:
             with suppress(RuntimeError):
                 outputs.disconnect()

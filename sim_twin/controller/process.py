@@ -94,6 +94,11 @@ class ControllerProcess:
         self.close()
 
     @property
+    def pid(self) -> int | None:
+        """The process's number, None while there is none."""
+        return None if self._process is None else self._process.pid
+
+    @property
     def is_alive(self) -> bool:
         """Whether it runs."""
         return self._process is not None and self._process.is_alive()
