@@ -111,20 +111,20 @@ class RobotiqGripper:
             self._send(f"SET SPE {speed} FOR {force} POS {position} GTO 1\n")
 
     def poll(self) -> GripState | None:
-        """Take in answers, ask the next question, and return the newest state.
+        """Ask the next question or take in answers, in turn, and return the newest state.
 
         Raises:
             WireError: the gripper closed the connection or has been silent for too long.
         """
         self._flush()
-        self._receive()
         if not self._is_query_out:
             self._send("GET POS\nGET OBJ\nGET STA\nGET ACT\n")
             self._is_query_out, self._n_silent = True, 0
-        else:
-            self._n_silent += 1
-            if self._n_silent > SILENT_LIMIT:
-                raise WireError(f"gripper: expected an answer within {SILENT_LIMIT} polls, got none; is it powered?")
+            return self.state
+        self._receive()
+        self._n_silent += 1
+        if self._is_query_out and self._n_silent > SILENT_LIMIT:
+            raise WireError(f"gripper: expected an answer within {SILENT_LIMIT} polls, got none; is it powered?")
         return self.state
 
     def close(self) -> None:

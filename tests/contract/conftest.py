@@ -1,4 +1,4 @@
-"""What the contract suites share: the rigs, which cases are worth their wall time, and a repeat on a stalled machine."""
+"""What the contract suites share: rigs, which cases are worth their wall time, a repeat on a stalled machine."""
 
 import multiprocessing
 import os
