@@ -75,6 +75,7 @@ def _period_rows(blocks: Blocks) -> tuple[BenchResult, ...]:
         BenchResult(name="bare_period_p50_ms", value=1e3 * bare.percentile_s(50.0), unit="ms"),
         BenchResult(name="bare_period_p99_ms", value=1e3 * bare.percentile_s(99.0), unit="ms"),
         BenchResult(name="bare_call_p50_us", value=1e6 * blocks.bare_call.percentile_s(50.0), unit="us"),
+        BenchResult(name="bare_call_p99_us", value=1e6 * blocks.bare_call.percentile_s(99.0), unit="us"),
         BenchResult(name="own_work_p50_us", value=1e6 * work.percentile_s(50.0), unit="us"),
         BenchResult(
             name="own_work_p99_us", value=work_us, unit="us", goal=f"<= {OWN_WORK_GOAL_US:g}",
