@@ -81,6 +81,7 @@ def _period_rows(blocks: Blocks) -> tuple[BenchResult, ...]:
             name="own_work_p99_us", value=work_us, unit="us", goal=f"<= {OWN_WORK_GOAL_US:g}",
             ok=0.0 < work_us <= OWN_WORK_GOAL_US,
         ),
+        BenchResult(name="own_cpu_p99_us", value=1e6 * blocks.own_cpu.percentile_s(99.0), unit="us"),
         BenchResult(
             name="late_tick_share", value=ours.over_share, unit="share", goal=f"<= {LATE_GOAL:g}",
             ok=ours.n > 0 and ours.over_share <= LATE_GOAL,

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable
-from time import perf_counter
+from time import perf_counter, thread_time
 
 from rtde_control import RTDEControlInterface
 
@@ -26,13 +26,15 @@ SWING_RAD, SWING_S = 0.02, 2.0
 class _Listener:
     """Implements robot.hal.protocols.Clock around an arm's: tells of each tick its period and what was not waiting.
 
+    The latter by the wall and by the processor, which leaves out what other processes took.
+
     Attributes:
         is_on: Whether it tells.
     """
 
-    def __init__(self, clock: Clock, tell: Callable[[float, float], None]) -> None:
+    def __init__(self, clock: Clock, tell: Callable[[float, float, float], None]) -> None:
         self._clock, self._tell = clock, tell
-        self._woke_s = 0.0
+        self._woke_s = self._woke_cpu_s = 0.0
         self.is_on = False
 
     def now_ns(self) -> int:
@@ -41,16 +43,16 @@ class _Listener:
 
     def begin(self) -> None:
         """A block begins."""
-        self.is_on, self._woke_s = True, perf_counter()
+        self.is_on, self._woke_s, self._woke_cpu_s = True, perf_counter(), thread_time()
 
     def wait_tick(self) -> int:
         """Wait as the arm's clock does."""
-        asleep_s = perf_counter()
+        asleep_s, asleep_cpu_s = perf_counter(), thread_time()
         n_missed = self._clock.wait_tick()
         if self.is_on:
-            woke_s = perf_counter()
-            self._tell(woke_s - self._woke_s, asleep_s - self._woke_s)
-            self._woke_s = woke_s
+            woke_s, woke_cpu_s = perf_counter(), thread_time()
+            self._tell(woke_s - self._woke_s, asleep_s - self._woke_s, asleep_cpu_s - self._woke_cpu_s)
+            self._woke_s, self._woke_cpu_s = woke_s, woke_cpu_s
         return n_missed
 
 
@@ -60,6 +62,7 @@ class Blocks:
     Attributes:
         period: From tick to tick through our loop.
         own_work: Of each of those ticks, what was not waiting, less the median call of the client in the block before.
+        own_cpu: The same by the processor's time of this thread.
         bare_period: From tick to tick with the client alone.
         bare_call: What the client's servoJ took there.
         n_stops: Blocks of ours that ended before their time, by a refusal of the gate or a loss of the arm.
@@ -73,7 +76,7 @@ class Blocks:
             arm: what is driven.
             resolved: its rig.
         """
-        self.period, self.own_work = Tally(over_s=LATE_S), Tally()
+        self.period, self.own_work, self.own_cpu = Tally(over_s=LATE_S), Tally(), Tally()
         self.bare_period, self.bare_call = Tally(over_s=LATE_S), Tally()
         self.n_stops, self.servo_s = 0, 0.0
         self._listener = _Listener(arm.clock, self._take)
@@ -139,6 +142,7 @@ class Blocks:
         self.servo_s += gone_s
         return True
 
-    def _take(self, period_s: float, spent_s: float) -> None:
+    def _take(self, period_s: float, spent_s: float, cpu_s: float) -> None:
         self.period.add(period_s)
         self.own_work.add(spent_s - self._call_s)
+        self.own_cpu.add(cpu_s - self._call_s)

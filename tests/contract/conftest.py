@@ -37,6 +37,7 @@ def pytest_collection_modifyitems(items):
 
 
 STALL_S, N_ATTEMPTS = 0.03, 3
+REPEATED = pytest.StashKey[list[str]]()
 
 
 def pytest_runtest_protocol(item, nextitem):
@@ -56,6 +57,7 @@ def pytest_runtest_protocol(item, nextitem):
         waited_s = _waited_s() - before_s
         if attempt == N_ATTEMPTS or waited_s < STALL_S or not any(report.failed for report in reports):
             break
+        item.config.stash.setdefault(REPEATED, []).append(f"{item.nodeid} (its processes waited {waited_s:.3f} s)")
         item._initrequest()
     for report in reports:
         if attempt > 1:
@@ -63,6 +65,11 @@ def pytest_runtest_protocol(item, nextitem):
         item.ihook.pytest_runtest_logreport(report=report)
     item.ihook.pytest_runtest_logfinish(nodeid=item.nodeid, location=item.location)
     return True
+
+
+def pytest_terminal_summary(terminalreporter, config):
+    for told in config.stash.get(REPEATED, []):
+        terminalreporter.write_line(f"repeated on a stalled machine: {told}")
 
 
 def _waited_s():
