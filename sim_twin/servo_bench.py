@@ -26,9 +26,9 @@ __all__ = ["bench_servo"]
 SHORT_S, HOUR_S = 34.0, 3600.0
 N_BLOCKS, SHORTEST_S, LONGEST_S, LONGEST_BARE_S = 8, 0.5, 60.0, 5.0
 OWN_WORK_GOAL_US, LATE_GOAL, CONTROLLER_GOAL_MS = 150.0, 0.005, 1.0
-SLOPE_GOAL_MB_H, SLOPE_FROM_S = 5.0, 600.0
-"""A slope over less time than this is that of the caches that fill: it is told and not judged."""
-S_PER_H, MB = 3600.0, 1e6
+SLOPE_GOAL_MB_H, SLOPE_FROM_S = 5.0, 300.0
+"""A slope is that of a run's second half; over less time than this it is of caches that fill: told and not judged."""
+N_FITTED, S_PER_H, MB = 3, 3600.0, 1e6
 
 
 class _Block(msgspec.Struct, frozen=True, kw_only=True):
@@ -111,8 +111,9 @@ def _memory_rows(noted: list[_Block]) -> tuple[BenchResult, ...]:
     """Return rows on resident memory, from the end of the first block of ours on: there everything has been used."""
     rows = []
     for who, sizes in (("client", [b.client_mb for b in noted]), ("controller", [b.controller_mb for b in noted])):
-        at_s = [block.at_s for block in noted]
-        slope = float(np.polyfit(at_s, sizes, 1)[0]) * S_PER_H if len(noted) > 1 else 0.0
+        half = len(noted) // 2 if len(noted) > N_FITTED else 0
+        at_s = [block.at_s for block in noted[half:]]
+        slope = float(np.polyfit(at_s, sizes[half:], 1)[0]) * S_PER_H if len(at_s) > 1 else 0.0
         is_judged = at_s[-1] - at_s[0] >= SLOPE_FROM_S
         goal = f"<= {SLOPE_GOAL_MB_H:g}" if is_judged else ""
         rows += [

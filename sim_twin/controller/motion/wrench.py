@@ -5,7 +5,7 @@ import numpy as np
 
 from sim_twin.controller.motion.poses import Array
 
-__all__ = ["NM_PER_A", "ContactWrench", "payload_bias"]
+__all__ = ["NM_PER_A", "ContactWrench", "is_same_payload", "payload_bias"]
 
 NM_PER_A = np.array([13.6, 13.6, 13.6, 9.1, 9.1, 9.1])
 """Joint torque over motor current: a torque constant near 0.135 (0.09) Nm/A behind a gear of 101, as published
@@ -41,6 +41,11 @@ class ContactWrench:
             total[:3] += force
             total[3:] += sign * (self._force[3:] @ R) + _cross(data.contact.pos[i] - point_m, force)
         return total
+
+
+def is_same_payload(one: tuple[float, Array], other: tuple[float, Array]) -> bool:
+    """Return whether two payloads, (kg, centre of gravity), are one: then a sensor has no bias."""
+    return one[0] == other[0] and one[1].tolist() == other[1].tolist()
 
 
 def payload_bias(T_bf: Array, point_m: Array, real: tuple[float, Array], known: tuple[float, Array]) -> Array:

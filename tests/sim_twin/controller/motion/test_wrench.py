@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from sim_twin.controller.motion.poses import matrix_from_pose
-from sim_twin.controller.motion.wrench import GRAVITY_M_S2, payload_bias
+from sim_twin.controller.motion.wrench import GRAVITY_M_S2, is_same_payload, payload_bias
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -23,3 +23,6 @@ def test_a_payload_that_is_told_rightly_adds_nothing():
     told = (0.925, np.array([0.0, 0.0, 0.058]))
     bias = payload_bias(matrix_from_pose([0.4, 0.1, 0.3, 3.1, 0.0, 0.2]), np.zeros(3), told, told)
     assert bias == pytest.approx(np.zeros(6), abs=1e-12)
+    assert is_same_payload(told, (0.925, np.array([0.0, 0.0, 0.058])))
+    assert not is_same_payload(told, (0.925, np.array([0.0, 1e-9, 0.058])))
+    assert not is_same_payload(told, (0.926, told[1]))
