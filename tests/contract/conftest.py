@@ -9,10 +9,12 @@ from _pytest.runner import runtestprotocol
 
 from tests.support.contract_rigs import WORLDS, open_world
 
+OPENED = pytest.StashKey[object]()
+
 
 @pytest.fixture(scope="module", params=WORLDS)
 def world(request):
-    opened = open_world(request.param)
+    opened = request.config.stash[OPENED] = open_world(request.param)
     yield opened
     opened.close()
 
@@ -58,6 +60,7 @@ def pytest_runtest_protocol(item, nextitem):
         if attempt == N_ATTEMPTS or waited_s < STALL_S or not any(report.failed for report in reports):
             break
         item.config.stash.setdefault(REPEATED, []).append(f"{item.nodeid} (its processes waited {waited_s:.3f} s)")
+        item.config.stash[OPENED].renew()
         item._initrequest()
     for report in reports:
         if attempt > 1:

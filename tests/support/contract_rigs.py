@@ -76,6 +76,9 @@ class LockStepWorld:
         """Take a station back after a test."""
         station.close()
 
+    def renew(self):
+        """Let a failed test be repeated; here every test begins anew anyway."""
+
     def close(self):
         """Nothing is held."""
 
@@ -179,6 +182,16 @@ class WireWorld:
     def leave(self, station):
         if station is not self._station:
             station.close()
+
+    def renew(self):
+        """Let a failed test be repeated, on another plant: one that saw its link stall may be used no more.
+
+        A process of its own would end; here the client is dropped, so that it cannot go on by itself.
+        """
+        plant = self.__dict__.pop("_plant", None)
+        if plant is not None:
+            plant.arm.close()
+            plant.arm._control = None
 
     def close(self):
         self._open.close()
