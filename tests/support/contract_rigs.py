@@ -184,10 +184,11 @@ class WireWorld:
             station.close()
 
     def renew(self):
-        """Let a failed test be repeated, on another plant: one that saw its link stall may be used no more.
+        """Let a failed test be repeated, on another plant and record: one that saw its link stall may be used no more.
 
         A process of its own would end; here the client is dropped, so that it cannot go on by itself.
         """
+        self.recording = None
         plant = self.__dict__.pop("_plant", None)
         if plant is not None:
             plant.arm.close()
