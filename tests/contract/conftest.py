@@ -1,7 +1,7 @@
 """What the contract suites share: rigs, which cases are worth their wall time, a repeat on a stalled machine."""
 
-import multiprocessing
 import os
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -43,11 +43,10 @@ REPEATED = pytest.StashKey[list[str]]()
 
 
 def pytest_runtest_protocol(item, nextitem):
-    """Repeat what failed in wall time while its processes had to wait for a processor; elsewhere a failure is one.
+    """Repeat what failed in wall time while the machine had too few processors; elsewhere a failure is one.
 
     An arm counts as lost after 50 ms without a state, and a program as silent after 100 ms without a command: where the
-    machine's load alone makes such gaps, a failure says nothing of the plant. How long the processes waited is the
-    kernel's own count.
+    machine's load alone makes such gaps, a failure says nothing of the plant. How long it was is the kernel's count.
     """
     name = getattr(getattr(item, "callspec", None), "params", {}).get("world")
     if name is None or WORLDS[name].is_lock_step:
@@ -59,12 +58,14 @@ def pytest_runtest_protocol(item, nextitem):
         waited_s = _waited_s() - before_s
         if attempt == N_ATTEMPTS or waited_s < STALL_S or not any(report.failed for report in reports):
             break
-        item.config.stash.setdefault(REPEATED, []).append(f"{item.nodeid} (its processes waited {waited_s:.3f} s)")
+        item.config.stash.setdefault(REPEATED, []).append(
+            f"{item.nodeid} (the machine was overbooked for {waited_s:.3f} s)"
+        )
         item.config.stash[OPENED].renew()
         item._initrequest()
     for report in reports:
         if attempt > 1:
-            report.sections.append(("stalls", f"attempt {attempt}; its processes waited {waited_s:.3f} s to run"))
+            report.sections.append(("stalls", f"attempt {attempt}; the machine was overbooked for {waited_s:.3f} s"))
         item.ihook.pytest_runtest_logreport(report=report)
     item.ihook.pytest_runtest_logfinish(nodeid=item.nodeid, location=item.location)
     return True
@@ -76,12 +77,12 @@ def pytest_terminal_summary(terminalreporter, config):
 
 
 def _waited_s():
-    """Return how long this process and those it started have been ready to run and did not, by the kernel's count."""
-    waited_ns = 0
-    for pid in (os.getpid(), *(child.pid for child in multiprocessing.active_children())):
-        for task in Path(f"/proc/{pid}/task").glob("*/schedstat"):
-            try:
-                waited_ns += int(task.read_text().split()[1])
-            except OSError:
-                continue  # it has just ended
-    return waited_ns * 1e-9
+    """Return how long somebody on this machine has been ready to run and did not, or its host ran something else."""
+    waited_s = 0.0
+    with suppress(OSError, ValueError, IndexError):
+        steal = Path("/proc/stat").read_text().split("\n", 1)[0].split()[8]
+        waited_s += int(steal) / os.sysconf("SC_CLK_TCK")
+    with suppress(OSError, ValueError, IndexError):
+        some = Path("/proc/pressure/cpu").read_text().split("\n", 1)[0]
+        waited_s += int(some.rsplit("total=", 1)[1]) * 1e-6
+    return waited_s
