@@ -60,6 +60,7 @@ class RobotiqGripper:
 
     Attributes:
         state: What the gripper last said; None before its first answers.
+        n_answers: How often it has said it.
     """
 
     def __init__(self, scale: GripScale) -> None:
@@ -72,6 +73,7 @@ class RobotiqGripper:
         self._is_query_out = False
         self._n_silent = 0
         self.state: GripState | None = None
+        self.n_answers = 0
 
     def connect(self, host: str, *, timeout_s: float = 2.0) -> None:
         """Open the connection; what was said on one before counts no more. Moves nothing.
@@ -170,6 +172,7 @@ class RobotiqGripper:
         self._said[words[0]] = int(words[1])
         if words[0] == "ACT":  # the last of the four questions
             self._is_query_out = False
+            self.n_answers += 1
             self._tell()
 
     def _tell(self) -> None:

@@ -32,12 +32,12 @@ from robot.hal.ur_state import (
     parse_version,
     why_refused,
 )
-from robot.messages import ArmCommand, ArmSpec, ArmState, Vec6
+from robot.messages import ArmCommand, ArmSpec, ArmState, GripState, Vec6
 
 __all__ = ["RtdeArm"]
 
 RATE_HZ = 500.0
-STALE_NS = 50_000_000
+STALE_NS, HAND_NS = 50_000_000, 40_000_000
 N_BITS = 16
 N_STANDARD = 8
 """Outputs below are standard ones, the rest configurable ones of the control box."""
@@ -78,7 +78,7 @@ class RtdeArm:
         self._outputs: RTDEIOInterface | None = None
         self._gripper = RobotiqGripper(GripScale.of(arm.tool))
         self._last_timestamp, self._seen_ns = -1.0, 0
-        self._put_bits = 0
+        self._put_bits = self._polled_ns = 0
 
     # ----------------------------------------------------------------------------------------------------- acquire
 
@@ -137,7 +137,7 @@ class RtdeArm:
         """
         receive, _ = self._reading()
         self._note_freshness(receive)
-        grip = self._gripper.poll()
+        grip = self._poll_hand()
         if grip is None:
             raise StaleStateError("arm: expected a state of the hand, none came yet")
         x, y, z, rx, ry, rz = receive.getActualTCPPose()
@@ -220,6 +220,16 @@ class RtdeArm:
             raise StaleStateError(
                 f"arm: expected a state every 2 ms, the newest is {age_ms:.0f} ms old; is the link up?"
             )
+
+    def _poll_hand(self) -> GripState | None:
+        """Return what the hand says; after a pause wait for what it says now, the next answer being of before."""
+        now_ns, hand = monotonic_ns(), self._gripper
+        is_late, self._polled_ns = now_ns - self._polled_ns > STALE_NS, now_ns
+        fresh, deadline_ns = hand.n_answers + 2, now_ns + HAND_NS
+        while is_late and hand.n_answers < fresh and monotonic_ns() < deadline_ns:
+            hand.poll()
+            self.clock.wait_tick()
+        return hand.poll()
 
     def _wait_first_state(self) -> None:
         deadline_ns = monotonic_ns() + round(START_S * 1e9)
