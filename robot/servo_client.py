@@ -30,6 +30,7 @@ from robot.servo_messages import (
     Stop,
     StrideReply,
     StrideRequest,
+    pack_intent,
 )
 from robot.servo_process import ENDING_REASONS, serve
 from robot.servo_watch import HUNG_S, ServoWatch
@@ -177,7 +178,7 @@ class ServoClient:
         Raises:
             NotEngagedError: there was none already, or nobody has seeded it.
         """
-        request = StrideRequest(intent=intent, grip=grip, n_ticks=n_ticks, is_hand_busy=is_hand_busy)
+        request = StrideRequest(intent=pack_intent(intent), grip=grip, n_ticks=n_ticks, is_hand_busy=is_hand_busy)
         if self._connection is None or self._newest is None:
             raise NotEngagedError("servo process: expected one that holds the arm; connect, engage and seed it")
         self._overhear()

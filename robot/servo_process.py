@@ -39,6 +39,7 @@ from robot.servo_messages import (
     Stop,
     StrideReply,
     StrideRequest,
+    unpack_intent,
 )
 from robot.tick_loop import TickLoop
 
@@ -181,7 +182,8 @@ class ServoServer:
             return
         self._grip = request.grip
         self._is_beginning = True
-        verdict = self._loop.begin(request.intent, n_ticks=request.n_ticks, is_hand_busy=request.is_hand_busy)
+        intent = unpack_intent(request.intent)
+        verdict = self._loop.begin(intent, n_ticks=request.n_ticks, is_hand_busy=request.is_hand_busy)
         self._is_beginning = False
         if verdict is None:
             self._n_left = request.n_ticks

@@ -21,6 +21,7 @@ from robot.errors import NotEngagedError, RobotError, StaleStateError, WireError
 from robot.geometry import quat_of_rotation_vector
 from robot.hal.link_watch import LinkWatch
 from robot.hal.pins import Pins
+from robot.hal.protocols import Clock
 from robot.hal.robotiq import GripScale, RobotiqGripper
 from robot.hal.rtde_clock import RtdeClock
 from robot.hal.rtde_outputs import N_OUTPUTS, DigitalOutputs
@@ -28,12 +29,12 @@ from robot.hal.rtde_set_up import arm_watchdog, prove_watchdog, require, set_too
 from robot.hal.ur_checks import check_facts, check_pose, check_serial
 from robot.hal.ur_primary import read_facts
 from robot.hal.ur_state import Runtime, UrStatus, check_ready, check_version, mode_of, parse_version
-from robot.messages import ArmCommand, ArmSpec, ArmState, Vec6
+from robot.messages import ArmCommand, ArmSpec, ArmState, GripState, Vec6
 
 __all__ = ["RtdeArm"]
 
 RATE_HZ = 500.0
-STALE_NS = 50_000_000
+STALE_NS, HAND_NS = 50_000_000, 40_000_000
 RTDE_PORT = 30004
 WRITE_NS = 35_000_000
 """A command that took longer was no mere sending: the client may have reconnected in it, which takes 40 ms at least."""
@@ -61,7 +62,8 @@ class RtdeArm:
             q_min_rad=_vec6([j.range_rad[0] for j in joints]), q_max_rad=_vec6([j.range_rad[1] for j in joints]),
             qd_max_rad_s=_vec6([j.speed_rad_s for j in joints]), grip_stroke_m=arm.tool.stroke_m,
         )  # fmt: skip
-        self.clock = RtdeClock()
+        self._pace = RtdeClock()
+        self.clock: Clock = self._pace
         self.address = address
         self.serial = ""
         """As the controller says, from connect() on."""
@@ -71,7 +73,7 @@ class RtdeArm:
         self._control: RTDEControlInterface | None = None
         self._outputs: DigitalOutputs | None = None
         self._gripper = RobotiqGripper(GripScale.of(arm.tool))
-        self._last_timestamp, self._seen_ns = -1.0, 0
+        self._last_timestamp, self._seen_ns, self._polled_ns = -1.0, 0, 0
         self._pins = Pins(cell)
         self._links = LinkWatch(address, RTDE_PORT)
         self._is_lost = False
@@ -104,7 +106,7 @@ class RtdeArm:
             self._receive = RTDEReceiveInterface(self.address, RATE_HZ)
         self._dashboard = dashboard
         self._gripper.connect(self.address)
-        self.clock.pace_by(self._receive)
+        self._pace.pace_by(self._receive)
         self._wait_first_state()
 
     def engage(self) -> None:
@@ -126,7 +128,8 @@ class RtdeArm:
             self._set_up(self._control, receive)
             self._links.look()
         except (RobotError, RuntimeError):
-            self._drop_control()  # an arm that was set up by half is nobody's: the next engage begins anew
+            # An arm that was set up by half is nobody's: the next engage begins anew.
+            self._drop_control(is_in_traceback=True)
             raise
 
     # ------------------------------------------------------------------------------------------------ read and write
@@ -141,7 +144,7 @@ class RtdeArm:
         receive, _ = self._reading()
         self._require_link()
         self._note_freshness(receive)
-        grip = self._gripper.poll()
+        grip = self._poll_hand()
         if grip is None:
             raise StaleStateError("arm: expected a state of the hand, none came yet")
         status = self.status()
@@ -211,10 +214,8 @@ class RtdeArm:
         if self._receive is None:
             return
         self.stop()
-        self.clock.pace_by(None)
-        receive, dashboard, self._receive, self._dashboard = self._receive, self._dashboard, None, None
-        with suppress(RuntimeError):
-            receive.disconnect()
+        self._pace.pace_by(None)
+        dashboard, self._receive, self._dashboard = self._dashboard, None, None  # see _drop_control
         with suppress(RuntimeError):
             if dashboard is not None:
                 dashboard.disconnect()
@@ -251,6 +252,16 @@ class RtdeArm:
                 f"arm: expected a state every 2 ms, the newest is {age_ms:.0f} ms old; is the link up?"
             )
 
+    def _poll_hand(self) -> GripState | None:
+        """Return what the hand says; after a pause wait for what it says now, the next answer being of before."""
+        now_ns, hand = monotonic_ns(), self._gripper
+        is_late, self._polled_ns = now_ns - self._polled_ns > STALE_NS, now_ns
+        fresh, deadline_ns = hand.n_answers + 2, now_ns + HAND_NS
+        while is_late and hand.n_answers < fresh and monotonic_ns() < deadline_ns:
+            hand.poll()
+            self.clock.wait_tick()
+        return hand.poll()
+
     def _wait_first_state(self) -> None:
         deadline_ns = monotonic_ns() + round(START_S * 1e9)
         while True:
@@ -276,8 +287,12 @@ class RtdeArm:
             self._gripper.activate()
         arm_watchdog(control, receive, self.clock)  # from here on somebody must write
 
-    def _drop_control(self) -> None:
-        """End the program and forget its client: it must never get the chance to go on by itself."""
+    def _drop_control(self, *, is_in_traceback: bool = False) -> None:
+        """End the program and forget its client: it must never get the chance to go on by itself.
+
+        A client disconnects when its last reference goes, and sleeps half a second each time it does. So it is told to
+        only where a traceback keeps it alive.
+        """
         self._links.forget()
         control, self._control = self._control, None
         outputs, self._outputs = self._outputs, None
@@ -291,7 +306,7 @@ class RtdeArm:
             with suppress(RuntimeError):
                 outputs.put(self._pins.rested(outputs.bits))
             outputs.close()
-        if control is not None:
+        if control is not None and is_in_traceback:
             with suppress(RuntimeError):
                 control.disconnect()
 

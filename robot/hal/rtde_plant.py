@@ -16,6 +16,21 @@ from robot.messages import PlantIdentity
 __all__ = ["RtdePlant"]
 
 
+class _NoResetter:
+    """A robot lays no table out: whoever does is reached by other ways, on the bus or in person."""
+
+    def reset(self, *, seed: int, epoch: int, digital_out: int) -> None:
+        """Refuse.
+
+        Raises:
+            RobotConfigError: always.
+        """
+        raise RobotConfigError(
+            f"reset (seed {seed}, epoch {epoch}, outputs {digital_out:b}): expected somebody who lays the table out, "
+            "the arm's controller cannot; give the rig a bus with a twin on it"
+        )
+
+
 class RtdePlant:
     """A UR5e at an address: real, or a virtual controller on this machine's loopback."""
 
@@ -33,7 +48,7 @@ class RtdePlant:
         self.arm = RtdeArm(arm=arm, address=rig.address, serial=rig.expected.serial, cell=cell)
         self.cameras: Mapping[str, Camera] = {}
         self.truth: SceneTruth | None = None
-        self.resetter: Resetter
+        self.resetter: Resetter = _NoResetter()
 
     @property
     def identity(self) -> PlantIdentity:

@@ -64,8 +64,7 @@ def prove_watchdog(control: RTDEControlInterface, receive: RTDEReceiveInterface,
     while receive.getTimestamp() - begun_s < PROOF_S and monotonic_ns() < deadline_ns:
         clock.wait_tick()
         if status_of(receive).runtime == Runtime.STOPPED:
-            control.disconnect()
-            return
+            return  # the client disconnects as it is dropped
     control.stopScript()
     control.disconnect()
     raise ArmRefusedError(

@@ -95,14 +95,14 @@ class ControllerProcess:
         self.close()
 
     @property
+    def pid(self) -> int | None:
+        """The process's number, None while there is none."""
+        return None if self._process is None else self._process.pid
+
+    @property
     def is_alive(self) -> bool:
         """Whether it runs."""
         return self._process is not None and self._process.is_alive()
-
-    @property
-    def pid(self) -> int | None:
-        """The process's number, None where it does not run."""
-        return None if self._process is None else self._process.pid
 
     def fault(self, name: str, **numbers: object) -> dict[str, object]:
         """Bring a fault about, or ask for the truth; see `faults`.

@@ -10,7 +10,7 @@ import pytest
 from perception.ground_truth import GroundTruthPerception
 from robot.errors import NotEngagedError, RobotConfigError, SafetyError, WireError
 from robot.local_station import LocalStation
-from robot.messages import GripCommand, Heading, PlantKind, StationMode
+from robot.messages import GripCommand, Heading, JointTarget, PlantKind, StationMode
 from robot.rigs import build_plant
 from robot.servo_client import ServoClient
 from robot.servo_process import EXIT_TERMINATED
@@ -196,3 +196,14 @@ def test_an_error_of_the_process_is_raised_here_by_its_kind():
     wrong = msgspec.structs.replace(resolved, rig=msgspec.structs.replace(resolved.rig, plant="os:getcwd"))
     with pytest.raises((RobotConfigError, WireError)):
         ServoClient(wrong).connect()
+
+
+@pytest.mark.parametrize("intent", [None, "up", object(), go(distance_m="far"), JointTarget(q_rad=(0.0,) * 5)])
+def test_what_is_no_intent_is_refused_by_the_gate_and_the_process_lives(client, intent):
+    client.engage()
+    client.seed()
+    verdict = stride(client, intent).verdict
+    assert (verdict.reason, verdict.is_latched) == ("malformed", True)
+    client.engage()
+    client.seed()
+    assert stride(client, go()).verdict is None

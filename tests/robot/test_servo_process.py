@@ -10,7 +10,19 @@ from robot.errors import ArmRefusedError, StaleStateError, WireError
 from robot.hal.fake import FakePlant
 from robot.messages import ArmMode, GripCommand, Heading
 from robot.servo_client import ServoClient
-from robot.servo_messages import Close, Connect, Done, Engage, Reply, Request, Seed, Seeded, StrideReply, StrideRequest
+from robot.servo_messages import (
+    Close,
+    Connect,
+    Done,
+    Engage,
+    Reply,
+    Request,
+    Seed,
+    Seeded,
+    StrideReply,
+    StrideRequest,
+    pack_intent,
+)
 from robot.servo_process import ServoServer
 from robot.tick_loop import TickLoop
 from tests.support.stations import fake_rig
@@ -101,7 +113,9 @@ def test_an_arm_lost_in_a_time_step_is_told_as_its_end(served):
     grip = GripCommand(opening_m=0.085, force_n=20.0, speed_m_s=0.15)
     intent = Heading(heading_rad=0.0, distance_m=0.01, height_m=0.2)
     served.ours.send_bytes(
-        msgspec.msgpack.encode(StrideRequest(intent=intent, grip=grip, n_ticks=1_000_000, is_hand_busy=False))
+        msgspec.msgpack.encode(
+            StrideRequest(intent=pack_intent(intent), grip=grip, n_ticks=1_000_000, is_hand_busy=False)
+        )
     )
     assert not served.ours.poll(0.05)
     served.fail(StaleStateError("no state"))
