@@ -262,7 +262,7 @@ class ServoClient:
 
     def _gone(self, how: str) -> WireError:
         """Clear away a process that has ended or lost its arm, and return the error that says so."""
-        why = f"{self._how_it_ended()} ({how})"
+        why = f"{self._how_it_ended()} ({how})" if how else self._how_it_ended()
         was_hung = self._watch is not None and self._watch.was_hung
         self._await_end()
         return StaleStateError(why) if was_hung else WireError(why)
