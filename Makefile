@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 RUN := runs/main
-BENCHES := twin grasp learning
+BENCHES := twin grasp learning servo
 
 .PHONY: run setup check test test-slow bench clean
 

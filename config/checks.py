@@ -4,6 +4,7 @@ import math
 from collections.abc import Callable, Iterable, Sequence
 
 from config.arm import ArmConfig
+from config.cell import CellConfig
 from config.decode import nearest
 from config.errors import ConfigError
 from config.learning import LearningConfig
@@ -126,6 +127,22 @@ def check_rig(rig: Rig, file: str) -> None:
     n_steps = rig.tick_s / rig.physics_s
     is_whole = n_steps >= 0.5 and abs(n_steps - round(n_steps)) < 1e-6
     _Checker(file).need(is_whole, "physics_s", f"a whole part of tick_s = {rig.tick_s:g}", f"{rig.physics_s:g}")
+
+
+def check_cell(cell: CellConfig, file: str) -> None:
+    """Check that every signal is wired once and no terminal twice, and that pulses have two coils and a length."""
+    checker = _Checker(file)
+    for key, wires in (("inputs", cell.inputs), ("outputs", cell.outputs)):
+        checker.unique(((f"{key}[{i}].signal", str(wire.signal)) for i, wire in enumerate(wires)), "a signal")
+    checker.unique(((f"inputs[{i}].pin", wire.pin) for i, wire in enumerate(cell.inputs)), "a terminal")
+    pins = [(f"outputs[{i}].pin", wire.pin) for i, wire in enumerate(cell.outputs)]
+    pins += [(f"outputs[{i}].off_pin", wire.off_pin) for i, wire in enumerate(cell.outputs) if wire.off_pin is not None]
+    checker.unique(pins, "a terminal")
+    for i, wire in enumerate(cell.outputs):
+        has_both = (wire.off_pin is None) == (wire.pulse_s is None)
+        checker.need(has_both, f"outputs[{i}].pulse_s", "off_pin and pulse_s, or neither", "one of them")
+        is_plain = wire.off_pin is None or not wire.inverted
+        checker.need(is_plain, f"outputs[{i}].inverted", "false for a drive that takes pulses", "true")
 
 
 def check_learning(learning: LearningConfig, file: str) -> None:

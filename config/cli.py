@@ -7,7 +7,7 @@ import typer
 
 from config.errors import ConfigError
 from config.kinds import Kind, check_file
-from config.loader import load_arm, load_learning, load_rig, load_rules, load_wired, resolve
+from config.loader import load_arm, load_cell, load_learning, load_rig, load_rules, load_wired, resolve
 from config.resolved import dump_resolved
 from config.sources import shipped_names
 
@@ -16,6 +16,7 @@ __all__ = ["app"]
 EXIT_CONFIG = 2
 SHIPPED = {
     "arms": load_arm,
+    "cells": load_cell,
     "learning": load_learning,
     "rigs": load_rig,
     "rules": load_rules,

@@ -5,9 +5,10 @@ from enum import StrEnum
 from pathlib import Path
 
 from config.arm import ArmConfig
+from config.cell import CellConfig
 from config.errors import ConfigError
 from config.learning import LearningConfig
-from config.loader import load_arm, load_learning, load_resolved, load_rig, load_rules, load_wired
+from config.loader import load_arm, load_cell, load_learning, load_resolved, load_rig, load_rules, load_wired
 from config.resolved import Resolved
 from config.rig import Rig
 from config.rules import RuleSet
@@ -23,6 +24,7 @@ class Kind(StrEnum):
     """The kinds of config files."""
 
     ARM = "arm"
+    CELL = "cell"
     LEARNING = "learning"
     RESOLVED = "resolved"
     RIG = "rig"
@@ -33,6 +35,7 @@ class Kind(StrEnum):
 COMMON_KEYS = ("name", "description")
 STRUCTS: dict[Kind, type[Section]] = {
     Kind.ARM: ArmConfig,
+    Kind.CELL: CellConfig,
     Kind.LEARNING: LearningConfig,
     Kind.RESOLVED: Resolved,
     Kind.RIG: Rig,
@@ -41,6 +44,7 @@ STRUCTS: dict[Kind, type[Section]] = {
 }
 LOADERS: dict[Kind, Callable[[Path], object]] = {
     Kind.ARM: load_arm,
+    Kind.CELL: load_cell,
     Kind.LEARNING: load_learning,
     Kind.RESOLVED: load_resolved,
     Kind.RIG: load_rig,

@@ -6,7 +6,8 @@ from typing import TypeVar
 import msgspec
 
 from config.arm import ArmConfig
-from config.checks import check_arm, check_learning, check_rig, check_rules, check_scenario
+from config.cell import CellConfig
+from config.checks import check_arm, check_cell, check_learning, check_rig, check_rules, check_scenario
 from config.decode import decode
 from config.errors import ConfigError
 from config.learning import LearningConfig
@@ -16,11 +17,12 @@ from config.rig import Rig
 from config.rules import RuleSet
 from config.scenario import Scenario
 from config.sources import Source, read_path, read_source
-from config.wiring import check_reachable, check_wiring
+from config.wiring import check_cell_fits, check_reachable, check_wiring
 from config.yaml_text import parse_yaml
 
 __all__ = [
     "load_arm",
+    "load_cell",
     "load_learning",
     "load_resolved",
     "load_rig",
@@ -43,11 +45,17 @@ class _Files(msgspec.Struct, frozen=True, kw_only=True):
     scenario: str
     rule_sets: tuple[str, ...]
     learning: str
+    cell: str = "cell"
 
 
 def load_arm(name: str | Path, *, base: Path | None = None) -> ArmConfig:
     """Return an arm: `ur5e`, or a path, relative ones starting from base."""
     return _load_arm(read_source("arms", name, base=base))
+
+
+def load_cell(name: str | Path, *, base: Path | None = None) -> CellConfig:
+    """Return how a control box is wired: `ur_box`, or a path, relative ones starting from base."""
+    return _load_cell(read_source("cells", name, base=base))
 
 
 def load_rig(name: str | Path) -> Rig:
@@ -93,6 +101,7 @@ def resolve(*, rig: str | Path = "twin", scenario: str | Path = "paper", learnin
         scenario=loaded_scenario,
         rule_sets=rule_sets,
         learning=_load_learning(learning_source),
+        cell=_cell_of(loaded_rig, rig_source),
     )
     files = _Files(
         rig=rig_source.file,
@@ -100,6 +109,7 @@ def resolve(*, rig: str | Path = "twin", scenario: str | Path = "paper", learnin
         scenario=scenario_file,
         rule_sets=rule_files,
         learning=learning_source.file,
+        cell=_cell_file(loaded_rig, rig_source),
     )
     _check_together(resolved, files)
     return resolved
@@ -116,9 +126,16 @@ def with_rig(resolved: Resolved, rig: str | Path) -> Resolved:
     arm = _load_arm(read_source("arms", loaded.arm, base=source.folder))
     if arm != resolved.arm:
         raise ConfigError(source.file, "arm", f"the arm that was used before, {resolved.arm.name}", repr(loaded.arm))
-    changed = msgspec.structs.replace(resolved, rig=loaded)
+    changed = msgspec.structs.replace(resolved, rig=loaded, cell=_cell_of(loaded, source))
     n = len(changed.rule_sets)
-    names = _Files(rig=source.file, arm=source.file, scenario="scenario", rule_sets=("rules",) * n, learning="learning")
+    names = _Files(
+        rig=source.file,
+        arm=source.file,
+        scenario="scenario",
+        rule_sets=("rules",) * n,
+        learning="learning",
+        cell=_cell_file(loaded, source),
+    )
     _check_together(changed, names)
     return changed
 
@@ -136,7 +153,10 @@ def load_resolved(path: Path) -> Resolved:
         scenario=f"{source.file}: scenario",
         rule_sets=tuple(f"{source.file}: rule_sets[{i}]" for i in range(n_sets)),
         learning=f"{source.file}: learning",
+        cell=f"{source.file}: cell",
     )
+    if resolved.cell is not None:
+        check_cell(resolved.cell, files.cell)
     check_rig(resolved.rig, files.rig)
     check_arm(resolved.arm, files.arm)
     check_learning(resolved.learning, files.learning)
@@ -151,6 +171,29 @@ def _load_arm(source: Source) -> ArmConfig:
     arm = _decode(source, ArmConfig)
     check_arm(arm, source.file)
     return arm
+
+
+def _load_cell(source: Source) -> CellConfig:
+    cell = _decode(source, CellConfig)
+    check_cell(cell, source.file)
+    return cell
+
+
+def _cell_of(rig: Rig, source: Source) -> CellConfig | None:
+    """Return the cell that a rig's file names, None where it names none."""
+    return None if rig.cell is None else _load_cell(_cell_source(rig.cell, source))
+
+
+def _cell_file(rig: Rig, source: Source) -> str:
+    return "cell" if rig.cell is None else _cell_source(rig.cell, source).file
+
+
+def _cell_source(name: str, rig: Source) -> Source:
+    """Return a rig's cell; a name that leads nowhere is an error of the rig's file."""
+    try:
+        return read_source("cells", name, base=rig.folder)
+    except ConfigError as error:
+        raise ConfigError(rig.file, "cell", error.expected, f"{error.got} ({error.file})") from error
 
 
 def _load_rig(source: Source) -> Rig:
@@ -218,6 +261,8 @@ def _check_together(resolved: Resolved, files: _Files) -> None:
             files.arm, "motion.step_s", f"whole ticks of the rig's {rig.tick_s:g} s", f"{arm.motion.step_s:g}"
         )
     check_fit(resolved.scenario, arm, files.scenario)
+    if resolved.cell is not None:
+        check_cell_fits(resolved.scenario, resolved.cell, files.cell)
 
 
 def _decode(source: Source, kind: type[S]) -> S:

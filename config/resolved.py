@@ -3,6 +3,7 @@
 import msgspec
 
 from config.arm import ArmConfig
+from config.cell import CellConfig
 from config.learning import LearningConfig
 from config.rig import Rig
 from config.rules import RuleSet
@@ -22,6 +23,8 @@ class Resolved(Section, frozen=True, kw_only=True):
     rule_sets: tuple[RuleSet, ...]
     """The i-th is in force from scenario.schedule[i].from_epoch."""
     learning: LearningConfig
+    cell: CellConfig | None = None
+    """How the rig's control box is wired; None is straight through."""
 
     def rules_at(self, epoch: int) -> RuleSet:
         """Return the rule set in force in an epoch."""

@@ -27,9 +27,14 @@ class Rig(Section, frozen=True, kw_only=True):
     arm: str
     """A shipped arm's name or a path to a file."""
     plant: ImportString
-    perception: ImportString
+    perception: ImportString | None = None
+    """What makes percepts; without one nothing can be learnt here, and the arm is not connected to."""
     operator: ImportString | None = None
     """Who arms the station where no hardware is attached; refused by a real arm."""
+    cell: str | None = None
+    """A shipped cell's name or a path: where the control box has the table's signals. Straight through where absent."""
+    reset: Annotated[str, Meta(pattern=r"^(twin|person)\Z")] = "twin"
+    """Who lays the table out: the twin's process, or a person whom the arm waits for."""
     address: Annotated[str, Meta(pattern=r"^[A-Za-z0-9._:-]{1,253}\Z")] | None = None
     """Host or IP address of the arm's controller, where it has one."""
     bus: Annotated[str, Meta(pattern=r"^(tcp|unixsock-stream)/[A-Za-z0-9._:/-]{1,200}\Z")] | None = None

@@ -1,12 +1,13 @@
 """Whether a rule set fits a scenario: its outputs, its inputs, and whether every goal can still be reached."""
 
+from config.cell import CellConfig
 from config.decode import nearest
 from config.errors import ConfigError
 from config.reachable import GRIPPER_INPUT, unreachable_goals
 from config.rules import RuleSet
 from config.scenario import Scenario
 
-__all__ = ["check_reachable", "check_wiring"]
+__all__ = ["check_cell_fits", "check_reachable", "check_wiring", "signals_of"]
 
 
 def check_wiring(scenario: Scenario, rules: RuleSet, file: str) -> None:
@@ -33,6 +34,31 @@ def check_wiring(scenario: Scenario, rules: RuleSet, file: str) -> None:
     for lid in lids:
         if lid not in ruled:
             raise ConfigError(file, "rules", f"a rule for each lid of scenario {scenario.name}", f"none for {lid}")
+
+
+def check_cell_fits(scenario: Scenario, cell: CellConfig, file: str) -> None:
+    """Check that a cell has a terminal for every signal of a scenario.
+
+    Raises:
+        ConfigError: it lacks one, named as the scenario names it.
+    """
+    inputs, outputs = signals_of(scenario)
+    for key, needed, wired in (
+        ("inputs", inputs, {wire.signal for wire in cell.inputs}),
+        ("outputs", outputs, {wire.signal for wire in cell.outputs}),
+    ):
+        for signal, what in needed.items():
+            if signal not in wired:
+                raise ConfigError(file, key, f"signal {signal}, {what} of scenario {scenario.name}", "no such entry")
+
+
+def signals_of(scenario: Scenario) -> tuple[dict[int, str], dict[int, str]]:
+    """Return what the scenario's inputs and outputs are, in words by their numbers."""
+    inputs = {button.input: button.name for button in scenario.buttons}
+    inputs |= {b.presence_input: f"{b.name} sensor" for b in scenario.boxes if b.presence_input is not None}
+    outputs = {button.lamp_output: f"{button.name} lamp" for button in scenario.buttons}
+    outputs |= {box.lid.output: f"{box.name} lid" for box in scenario.boxes if box.lid is not None}
+    return inputs, outputs
 
 
 def check_reachable(scenario: Scenario, rules: RuleSet, where: str, file: str) -> None:

@@ -1,6 +1,7 @@
 """From a resolved config to a learner: an agent of the config's layers, and the rig's station to act through."""
 
 from functools import partial
+from pathlib import Path
 
 import torch
 
@@ -23,17 +24,20 @@ __all__ = ["RobotLearner", "build_agent", "learner_maker"]
 class RobotLearner:
     """An agent and the station it acts through (learning.evaluation.Learner)."""
 
-    def __init__(self, resolved: Resolved, *, seed: int, stopwatch: Stopwatch | None = None) -> None:
+    def __init__(
+        self, resolved: Resolved, *, seed: int, stopwatch: Stopwatch | None = None, pictures: Path = Path("resets")
+    ) -> None:
         """Build plant and station, arm it where nobody has to be there for that, and build the agent.
 
         Args:
             resolved: everything a run is made of.
             seed: root seed of the run.
             stopwatch: hears of every layer's time; None measures nothing.
+            pictures: folder for what a person who lays the table out needs to see.
         """
         # One small network at a time: more threads cost more than they bring, and the number would change the sums.
         torch.set_num_threads(1)
-        station = build_station(resolved, heard_by=None if stopwatch is None else stopwatch.lap)
+        station = build_station(resolved, heard_by=None if stopwatch is None else stopwatch.lap, pictures=pictures)
         self.station = OperatedStation(station, build_operator(resolved.rig))
         self.station.connect()
         self.identity: PlantIdentity = station.identity

@@ -65,7 +65,7 @@ def assess(
         )
         for goal in range(n_goals)
     ]
-    learner = RobotLearner(resolved, seed=manifest.seed)
+    learner = RobotLearner(resolved, seed=manifest.seed, pictures=folder.path / "resets")
     try:
         learner.agent.load_state_dict(state["agent"])
         scores = [run_test(learner.agent, learner.station, test) for test in tests]

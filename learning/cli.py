@@ -1,7 +1,6 @@
 """Commands of the learning room: learn, evaluate, explain, report. The edge: terminal, files and the host's clock."""
 
 import functools
-import os
 from collections.abc import Callable
 from pathlib import Path
 from time import perf_counter
@@ -11,6 +10,7 @@ import msgspec
 import typer
 from rich.console import Console
 
+from learning.consent import Consent
 from learning.ended import Ended
 from learning.errors import LearningError, RunFolderError
 from learning.figures import curriculum_figure, performance_figure, save
@@ -28,7 +28,6 @@ if TYPE_CHECKING:
 __all__ = ["evaluate", "explain", "learn", "report"]
 
 EXIT_FAILED, EXIT_USAGE, EXIT_INTERRUPTED = 1, 2, 130
-MAX_WORKERS = 4
 WIDE = 180
 
 P = ParamSpec("P")
@@ -67,19 +66,20 @@ def learn(
 ) -> None:
     """Let the arm teach itself a scenario's goals; leave a run folder with metrics, checkpoints and figures.
 
-    Ctrl-C stops at the end of the epoch in hand (exit code 130) and loses nothing; --resume goes on, bit for bit.
+    Ctrl-C stops at the end of the epoch in hand (exit code 130) and loses nothing. --resume goes on: in lock-step bit
+    for bit, by the wall clock (rigs with an address) from the same learnt state.
     """
     from learning.session import open_session  # brings torch, seconds that reports do not need
 
     wanted = Wanted(scenario=scenario, rig=rig, preset=preset, seed=seed, epochs=epochs, judged=judged)
     folder = RunFolder(out or _default_folder(wanted))
-    n_workers = _default_workers() if workers is None else workers
     console = Console(stderr=True)
     stopwatch = Stopwatch(perf_counter)
     with folder:
-        session = open_session(folder, wanted, resume=resume, stopwatch=stopwatch)
+        consent = Consent(folder, workers=workers)
+        session = open_session(folder, wanted, resume=resume, stopwatch=stopwatch, consent=consent)
         try:
-            ended = _run(session, folder, console, n_workers)
+            ended = _run(session, folder, console, consent.n_workers)
         finally:
             session.close()
         run = load_run(folder)
@@ -204,8 +204,3 @@ def _tell(run: Run, ended: Ended) -> None:
 def _default_folder(wanted: Wanted) -> Path:
     parts = (Path(wanted.scenario or "paper").stem, Path(wanted.preset or "default").stem, str(wanted.seed or 0))
     return Path("runs") / "-".join(parts)
-
-
-def _default_workers() -> int:
-    """Return how many workers keep the processors busy, this process counted."""
-    return max(0, min(MAX_WORKERS, len(os.sched_getaffinity(0)) - 1))

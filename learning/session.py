@@ -86,7 +86,14 @@ class Session:
         self._learner.close()
 
 
-def open_session(folder: RunFolder, wanted: Wanted, *, resume: bool, stopwatch: Stopwatch) -> Session:
+def open_session(
+    folder: RunFolder,
+    wanted: Wanted,
+    *,
+    resume: bool,
+    stopwatch: Stopwatch,
+    consent: Callable[[Resolved, int], None] = lambda _resolved, _n_done: None,
+) -> Session:
     """Begin a run in a folder, or read where the run that it holds was left.
 
     Args:
@@ -94,33 +101,41 @@ def open_session(folder: RunFolder, wanted: Wanted, *, resume: bool, stopwatch: 
         wanted: what was asked for; where a run is gone on with, it must not be another.
         resume: go on with the run that the folder holds, if it holds one.
         stopwatch: hears of every layer's time.
+        consent: is told what the run is made of and how many epochs are done, before any arm is connected to; raises
+            where it shall not go on.
 
     Raises:
         ConfigError: a config file is missing or wrong.
         RunFolderError: the folder holds a run that is not to be resumed, or another one, or something else.
     """
     if resume and folder.holds_run():
-        return _take_up(folder, wanted, stopwatch)
+        return _take_up(folder, wanted, stopwatch, consent)
     folder.refuse_unless_empty()
     resolved = resolve_wanted(wanted)
+    consent(resolved, 0)
     session = _assemble(folder, resolved, wanted.seed or 0, stopwatch)
     folder.start(session.manifest, dump_resolved(resolved))
     return session
 
 
-def _take_up(folder: RunFolder, wanted: Wanted, stopwatch: Stopwatch) -> Session:
+def _take_up(
+    folder: RunFolder, wanted: Wanted, stopwatch: Stopwatch, consent: Callable[[Resolved, int], None]
+) -> Session:
     then, resolved = folder.manifest(), folder.config()
     refuse_another(wanted, str(folder.path), resolved, then.seed)
+    state, passed_over = folder.checkpoints.newest() if folder.checkpoints.exists() else (None, [])
+    consent(resolved, 0 if state is None else state["n_done"])
     session = _assemble(folder, resolved, then.seed, stopwatch)
+    session.state = state
     session.remarks += _differences(then, session.manifest)
-    if folder.checkpoints.exists():
-        session.state, passed_over = folder.checkpoints.newest()
-        session.remarks += [f"passed over a torn checkpoint: {reason}" for reason in passed_over]
+    session.remarks += [f"passed over a torn checkpoint: {reason}" for reason in passed_over]
+    if resolved.rig.bus is not None and state is not None:
+        session.remarks.append("the arm runs by the wall clock: what was learnt goes on, but not bit for bit")
     return session
 
 
 def _assemble(folder: RunFolder, resolved: Resolved, seed: int, stopwatch: Stopwatch) -> Session:
-    learner = RobotLearner(resolved, seed=seed, stopwatch=stopwatch)
+    learner = RobotLearner(resolved, seed=seed, stopwatch=stopwatch, pictures=folder.path / "resets")
     manifest = manifest_of(
         resolved,
         seed=seed,

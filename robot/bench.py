@@ -17,7 +17,7 @@ from rich.table import Table
 __all__ = ["BENCH_GROUP", "Bench", "BenchReport", "BenchResult", "bench", "bench_report"]
 
 BENCH_GROUP = "autotelic.benches"
-VERSIONS_OF = ("autotelic", "mujoco", "placo", "ruckig", "torch", "numpy", "msgspec")
+VERSIONS_OF = ("autotelic", "mujoco", "placo", "ruckig", "torch", "numpy", "msgspec", "ur_rtde")
 
 
 class BenchResult(msgspec.Struct, frozen=True, kw_only=True):
@@ -44,7 +44,7 @@ class BenchReport(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Bench(Protocol):
-    """A registered bench. One that reads a run folder takes a further keyword `run`."""
+    """A registered bench. One that reads a run folder takes a further keyword `run`, one of any length `seconds`."""
 
     def __call__(self, *, full: bool) -> BenchReport:
         """Measure; full takes the numbers an issue asks for, else at most 50 s."""
@@ -64,6 +64,10 @@ def bench(
     *,
     json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
     full: Annotated[bool, typer.Option("--full", help="Take all the samples, however long it lasts.")] = False,
+    seconds: Annotated[
+        float | None,
+        typer.Option("--seconds", min=1.0, help="How long, for a bench that takes any length."),
+    ] = None,
 ) -> None:
     """Measure and print figures; exit code 1 if one of them misses its goal."""
     known = {point.name: point for point in entry_points(group=BENCH_GROUP)}
@@ -72,7 +76,7 @@ def bench(
         return
     if name not in known:
         raise typer.BadParameter(f"expected one of {', '.join(sorted(known))}, got {name}", param_hint="NAME")
-    report = _measure(known[name], full=full, run=run)
+    report = _measure(known[name], full=full, run=run, seconds=seconds)
     if json:
         typer.echo(msgspec.json.encode(report).decode())
     else:
@@ -81,14 +85,16 @@ def bench(
         raise typer.Exit(1)
 
 
-def _measure(point: EntryPoint, *, full: bool, run: Path | None) -> BenchReport:
-    """Load and call a bench, handing it the run folder if it takes one."""
+def _measure(point: EntryPoint, *, full: bool, run: Path | None, seconds: float | None) -> BenchReport:
+    """Load and call a bench, handing it the run folder and the length if it takes them."""
     function = point.load()
-    if "run" in inspect.signature(function).parameters:
-        return function(full=full, run=run)
-    if run is not None:
+    known = inspect.signature(function).parameters
+    if run is not None and "run" not in known:
         raise typer.BadParameter(f"bench {point.name} reads no run folder", param_hint="RUN")
-    return function(full=full)
+    if seconds is not None and "seconds" not in known:
+        raise typer.BadParameter(f"bench {point.name} has a length of its own", param_hint="--seconds")
+    offered = {"run": run, "seconds": seconds}
+    return function(full=full, **{name: value for name, value in offered.items() if name in known})
 
 
 def _print_table(report: BenchReport) -> None:

@@ -1,5 +1,7 @@
 """A station whose arm is held by a servo process and whose table is laid out by somebody else on the bus."""
 
+from pathlib import Path
+
 from config.resolved import Resolved
 from robot.bus import open_session
 from robot.bus.twin_link import RemoteResetter, RemoteTruth
@@ -7,6 +9,9 @@ from robot.errors import RobotConfigError
 from robot.hal.protocols import Resetter, SceneTruth
 from robot.local_station import LocalStation, Perceives
 from robot.messages import PlantIdentity
+from robot.person import TerminalPerson
+from robot.person_reset import PersonResetter
+from robot.person_station import PersonResetStation
 from robot.servo_client import ServoClient
 
 __all__ = ["build_lab_station"]
@@ -28,12 +33,13 @@ class _LabWorld:
         return self._loop.identity
 
 
-def build_lab_station(resolved: Resolved, perception: Perceives) -> LocalStation:
+def build_lab_station(resolved: Resolved, perception: Perceives, *, pictures: Path) -> LocalStation:
     """Return the station of a rig with a bus, disarmed; the bus is open, the arm not connected to.
 
     Args:
         resolved: rig, arm, scenario and rule sets.
         perception: what makes percepts.
+        pictures: where a person who lays the table out finds what belongs where.
 
     Raises:
         RobotConfigError: the rig names no bus.
@@ -45,6 +51,16 @@ def build_lab_station(resolved: Resolved, perception: Perceives) -> LocalStation
     session = open_session(rig.bus, is_hub=False)
     loop = ServoClient(resolved, when_closed=session.close)
     truth = RemoteTruth(session, rig.expected.serial)
+    if rig.reset == "person":
+        by_person = PersonResetter(
+            scenario=resolved.scenario, loop=loop, scene=truth, person=TerminalPerson(), pictures=pictures
+        )
+        world = _LabWorld(loop=loop, truth=truth, resetter=by_person)
+        station = PersonResetStation(
+            world=world, loop=loop, perception=perception, arm=resolved.arm, scenario=resolved.scenario, rig=rig
+        )
+        station.prepare(by_person, resolved.arm.home_rad)
+        return station
     resetter = RemoteResetter(session, rig.expected.serial, loop=loop, truth=truth)
     world = _LabWorld(loop=loop, truth=truth, resetter=resetter)
     return LocalStation(

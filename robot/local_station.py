@@ -8,7 +8,7 @@ import msgspec
 from config.arm import ArmConfig
 from config.rig import Rig
 from config.scenario import Scenario
-from robot.errors import RobotConfigError
+from robot.errors import RobotConfigError, WireError
 from robot.hal.protocols import Resetter, SceneTruth
 from robot.messages import (
     ArmState,
@@ -16,15 +16,17 @@ from robot.messages import (
     Grip,
     GripCommand,
     Intent,
+    Outcome,
     Percept,
     PlantIdentity,
     SceneState,
     StationSpec,
     StationState,
     StepResult,
+    Verdict,
 )
 from robot.motion import HandReflexes
-from robot.safety import Arming
+from robot.safety import Arming, Reason
 from robot.tick_loop import Stride
 
 __all__ = ["LocalStation", "Perceives"]
@@ -68,6 +70,11 @@ class Loop(Protocol):
         """Whether something holds the tool up."""
         ...
 
+    @property
+    def why_lost(self) -> str | None:
+        """Why command was lost between time steps since it was taken, None where it was not."""
+        ...
+
     def connect(self) -> None:
         """Acquire the arm. Moves nothing."""
         ...
@@ -78,6 +85,10 @@ class Loop(Protocol):
 
     def begin_epoch(self, epoch: int) -> int:
         """Take up an epoch's rules and return the outputs it begins with."""
+        ...
+
+    def stop(self) -> None:
+        """Stop the arm and give up command."""
         ...
 
     def seed(self) -> ArmState:
@@ -126,6 +137,7 @@ class LocalStation:
             table_height_m=table_m,
         )
         self._percept: Percept
+        self._measured: ArmState
         self._is_connected = False
 
     def __enter__(self) -> "LocalStation":
@@ -144,7 +156,11 @@ class LocalStation:
 
     @property
     def state(self) -> StationState:
-        """Mode and, when latched, why."""
+        """Mode and, when latched, why. Command that was lost between time steps latches here."""
+        if self._arming.is_engaged:
+            why = self._loop.why_lost
+            if why is not None:
+                self._arming.latch(why)
         return self._arming.state
 
     @property
@@ -196,8 +212,9 @@ class LocalStation:
         Raises:
             NotEngagedError: the station is not engaged; a latch is never cleared here.
         """
-        self._arming.require_engaged()
+        self._require_command()
         self.reset_plant(seed=seed, epoch=epoch)
+        self._require_command()
         self._loop.engage()  # a plant that stopped its arm for the reset took command away
         return self._seed()
 
@@ -224,6 +241,11 @@ class LocalStation:
             self._is_connected = False
         self._arming.disarm()
 
+    def _require_command(self) -> None:
+        """Raise NotEngagedError unless engaged, and latch what was lost unnoticed: no reset takes the arm again."""
+        _ = self.state
+        self._arming.require_engaged()
+
     def _seed(self) -> Percept:
         """Start everything from the measured state."""
         state = self._loop.seed()
@@ -236,15 +258,20 @@ class LocalStation:
         percept = self._perception.perceive(state, None if truth is None else truth.read())
         if self._loop.is_in_contact:
             percept = msgspec.structs.replace(percept, is_in_contact=True)
-        self._percept = percept
+        self._percept, self._measured = percept, state
         return percept
 
     def _result(self, stride: Stride, duration_s: float) -> StepResult:
         (x0, y0, z0), (x1, y1, z1) = stride.before.tcp_position_m, stride.after.tcp_position_m
         is_lost = self._reflexes.lost_object
         verdicts = () if stride.verdict is None else (stride.verdict,)
+        try:
+            percept = self._perceive(stride.after)
+        except WireError as error:
+            percept = self._percept  # nothing newer is known, and the step counts for nothing
+            verdicts = (*verdicts, self._lose_sight(stride.after, str(error)))
         return StepResult(
-            percept=self._perceive(stride.after),
+            percept=percept,
             executed=Executed(
                 duration_s=duration_s,
                 moved_m=(x1 - x0, y1 - y0, z1 - z0),
@@ -253,6 +280,15 @@ class LocalStation:
             ),
             verdicts=verdicts,
             is_void=is_lost or bool(verdicts),
+        )
+
+    def _lose_sight(self, state: ArmState, why: str) -> Verdict:
+        """Stop and latch: without a percept nobody may move the arm on."""
+        self._loop.stop()
+        reason = Reason.STALE_STATE.value
+        self._arming.latch(f"{reason}: {why}")
+        return Verdict(
+            stamp_ns=state.stamp_ns, sequence=-1, outcome=Outcome.REFUSED, reason=reason, detail=why, is_latched=True
         )
 
     def _whole_ticks(self, duration_s: float) -> int:

@@ -3,9 +3,11 @@
 import inspect
 from collections.abc import Callable
 from importlib import import_module
+from pathlib import Path
 from typing import Any
 
 from config.arm import ArmConfig
+from config.cell import CellConfig
 from config.resolved import Resolved
 from config.rig import Rig
 from config.scenario import Scenario
@@ -16,7 +18,7 @@ from robot.safety import Operator
 from robot.tick_loop import TickLoop
 from robot.timed import time_world
 
-__all__ = ["build_operator", "build_plant", "build_station", "load"]
+__all__ = ["build_operator", "build_plant", "build_station", "check_learnable", "check_usable", "load"]
 
 
 def load(import_string: str) -> Any:  # noqa: ANN401 - what a string names is known only at run time
@@ -34,30 +36,73 @@ def load(import_string: str) -> Any:  # noqa: ANN401 - what a string names is kn
         ) from error
 
 
-def build_plant(*, rig: Rig, arm: ArmConfig, scenario: Scenario) -> Plant:
+def build_plant(*, rig: Rig, arm: ArmConfig, scenario: Scenario, cell: CellConfig | None = None) -> Plant:
     """Return the plant that a rig names, not yet connected."""
-    return _make(rig.plant, "plant", arm=arm, scenario=scenario, rig=rig)
+    return _make(rig.plant, "plant", arm=arm, scenario=scenario, rig=rig, cell=cell)
 
 
 def build_station(
-    resolved: Resolved, *, plant: Plant | None = None, heard_by: Callable[[str], None] | None = None
+    resolved: Resolved,
+    *,
+    plant: Plant | None = None,
+    heard_by: Callable[[str], None] | None = None,
+    pictures: Path = Path("resets"),
 ) -> LocalStation:
     """Return the station of a resolved config, disarmed and not yet connected.
 
     Args:
         resolved: Rig, arm, scenario and rule sets.
         plant: One that is already made, in place of the rig's.
+        pictures: Folder for what a person who lays the table out needs to see.
         heard_by: A stopwatch's lap that hears of every tick, where the arm is held in this process.
     """
     rig, arm, scenario = resolved.rig, resolved.arm, resolved.scenario
-    perception = _make(rig.perception, "perception", scenario=scenario, arm=arm)
+    check_usable(rig)
+    perception = _make(_require_perception(rig), "perception", scenario=scenario, arm=arm)
     if rig.bus is not None and plant is None:
-        return load("robot.lab:build_lab_station")(resolved, perception)  # brings the bus, which lock-step never needs
-    world = build_plant(rig=rig, arm=arm, scenario=scenario) if plant is None else plant
+        return load("robot.lab:build_lab_station")(
+            resolved, perception, pictures=pictures
+        )  # brings the bus, which lock-step never needs
+    world = build_plant(rig=rig, arm=arm, scenario=scenario, cell=resolved.cell) if plant is None else plant
     if heard_by is not None:
         time_world(world, heard_by)
     loop = TickLoop(arm=world.arm, config=arm, scenario=scenario, rule_sets=resolved.rule_sets, rig=rig)
     return LocalStation(world=world, loop=loop, perception=perception, arm=arm, scenario=scenario, rig=rig)
+
+
+def check_usable(rig: Rig) -> None:
+    """Check that a rig whose arm is at an address says which arm is to be found there.
+
+    Raises:
+        RobotConfigError: address or serial are not filled in.
+    """
+    if rig.bus is None:
+        return
+    missing = [key for key, value in (("address", rig.address), ("expected.serial", rig.expected.serial)) if not value]
+    if missing:
+        raise RobotConfigError(
+            f"rig {rig.name}: expected {' and '.join(missing)} of the arm, not filled in yet: copy the rig's file "
+            f"(`autotelic config show --rig {rig.name}` prints it), fill them in and give its path with --rig"
+        )
+
+
+def check_learnable(rig: Rig) -> None:
+    """Check, before anything is connected to, that a learner could see what it does on a rig.
+
+    Raises:
+        RobotConfigError: address or serial are not filled in, or the rig has no perception.
+    """
+    check_usable(rig)
+    _require_perception(rig)
+
+
+def _require_perception(rig: Rig) -> str:
+    if rig.perception is None:
+        raise RobotConfigError(
+            f"rig {rig.name}: expected a perception, it has none: percepts by camera are not there yet, and without "
+            "them nothing can be learnt on a real arm. Nothing was connected to, nothing moves"
+        )
+    return rig.perception
 
 
 def build_operator(rig: Rig) -> Operator | None:

@@ -12,7 +12,8 @@ import msgspec
 from config.resolved import Resolved
 from robot import errors
 from robot.errors import NotEngagedError, RobotError, StaleStateError, WireError
-from robot.messages import ArmState, GripCommand, Intent, PlantIdentity
+from robot.messages import ArmState, GripCommand, Intent, Outcome, PlantIdentity, Verdict
+from robot.safety import Reason
 from robot.servo_messages import (
     BeginEpoch,
     Close,
@@ -29,6 +30,7 @@ from robot.servo_messages import (
     Stop,
     StrideReply,
     StrideRequest,
+    pack_intent,
 )
 from robot.servo_process import ENDING_REASONS, serve
 from robot.servo_watch import HUNG_S, ServoWatch
@@ -40,8 +42,7 @@ START_S, ENGAGE_S, ANSWER_S = 60.0, 20.0, 5.0
 STRIDE_SLACK_S = 5.0
 """How much later than it should a time step may end while the process still ticks."""
 CLOSE_S = 5.0
-LEAVE_S = 3.0
-"""How long a process that has lost its arm may take to stop it, where it still can, and to end."""
+"""How long a process may take to stop its arm, where it still can, and to end."""
 COAST_S = 0.5
 """Longer than the controller's watchdog waits and the arm then takes to rest."""
 
@@ -72,10 +73,36 @@ class ServoClient:
         self._connection: Connection | None = None
         self._watch: ServoWatch | None = None
         self._is_leaving = False
+        """It has said that it lost its arm, or its end of the pipe is closed."""
+        self._is_answer_due = False
+        """A question was asked whose answer nobody has taken."""
+        self._is_in_command = False
+        self._told: StrideReply | None = None
+        """What latched between time steps, until somebody takes it."""
+        self._is_refusal_due = False
+        """It crossed a time step on the way, which will be refused."""
+        self._why_lost: str | None = None
+        self._newest: ArmState | None = None
         self._encode = msgspec.msgpack.Encoder().encode
         self._decode = msgspec.msgpack.Decoder(Reply).decode
         self.identity: PlantIdentity | None = None
         self.is_in_contact = False
+
+    @property
+    def why_lost(self) -> str | None:
+        """Why command was lost between time steps since it was taken, None where it was not."""
+        self._overhear()
+        if self._told is not None and self._told.stride.verdict is not None:
+            verdict = self._told.stride.verdict
+            return f"{verdict.reason}: {verdict.detail}"
+        if self._is_in_command and self._is_gone:
+            return self._how_it_ended()
+        return self._why_lost
+
+    @property
+    def _is_gone(self) -> bool:
+        """Whether there is no process, or one that must not be asked any more."""
+        return self._process is None or self._is_leaving or not self._process.is_alive()
 
     @property
     def pid(self) -> int | None:
@@ -88,9 +115,10 @@ class ServoClient:
         Raises:
             RobotError: the arm could not be acquired; the process has ended again.
         """
-        self._reap()
-        if self._process is not None:
+        self._overhear()
+        if not self._is_gone:
             return
+        self._await_end()
         context = get_context("spawn")
         ours, theirs = context.Pipe()
         pulse = context.RawArray("q", 1)
@@ -107,21 +135,28 @@ class ServoClient:
             raise
 
     def engage(self) -> None:
-        """Take command of the arm; a process that has ended is started anew."""
+        """Take command of the arm; a process that has ended is started anew, and what was lost before is forgotten."""
         self.connect()
+        self._told = self._why_lost = None
         self._ask(Engage(), Done, ENGAGE_S)
+        self._is_in_command = True
 
     def stop(self) -> None:
-        """Stop the arm and give up command. Where no process holds it any more, wait until its own watchdog has."""
-        self._reap()
-        if self._process is not None:
+        """Stop the arm and give up command. Where no process holds it any more, wait until its own watchdog has.
+
+        A loss that nobody has noticed yet is still told afterwards.
+        """
+        self._overhear()
+        if not self._is_gone:
             try:
                 self._ask(Stop(), Done, ANSWER_S)
             except WireError:
                 if self._process is not None:
                     raise
             else:
+                self._is_in_command = False
                 return
+        self._await_end()
         sleep(COAST_S)
 
     def begin_epoch(self, epoch: int) -> int:
@@ -132,36 +167,54 @@ class ServoClient:
     def seed(self) -> ArmState:
         """Start everything from the measured state, and return it."""
         self.is_in_contact = False
-        return self._ask(Seed(), Seeded, ANSWER_S).state
+        self._newest = self._ask(Seed(), Seeded, ANSWER_S).state
+        return self._newest
 
     def stride(self, intent: Intent, grip: GripCommand, *, n_ticks: int, is_hand_busy: bool) -> Stride:
         """Carry out an intent for so many ticks. What latched since the last one is told in its place.
 
+        A process that hangs or has ended is gone then: the verdict says so.
+
         Raises:
-            WireError: the process hangs or has ended; it is gone now.
+            NotEngagedError: there was none already, or nobody has seeded it.
         """
-        request = StrideRequest(intent=intent, grip=grip, n_ticks=n_ticks, is_hand_busy=is_hand_busy)
-        told = self._overheard()
-        if told is None:
-            told = self._ask(request, StrideReply, n_ticks * self._tick_s + STRIDE_SLACK_S)
+        request = StrideRequest(intent=pack_intent(intent), grip=grip, n_ticks=n_ticks, is_hand_busy=is_hand_busy)
+        if self._connection is None or self._newest is None:
+            raise NotEngagedError("servo process: expected one that holds the arm; connect, engage and seed it")
+        self._overhear()
+        told, self._told = self._told, None
+        try:
+            if told is None:
+                told = self._ask(request, StrideReply, n_ticks * self._tick_s + STRIDE_SLACK_S)
+        except WireError as error:
+            return _cut_short(self._newest, str(error))
         stride = told.stride
-        self._is_leaving = stride.verdict is not None and stride.verdict.reason in ENDING_REASONS
-        self.is_in_contact = stride.is_in_contact
+        self._is_leaving |= stride.verdict is not None and stride.verdict.reason in ENDING_REASONS
+        self._newest, self.is_in_contact = stride.after, stride.is_in_contact
         return stride
 
     def close(self) -> None:
         """Stop, release and end the process. Idempotent, never raises."""
-        when_closed, self._when_closed = self._when_closed, None
-        if when_closed is not None:
-            when_closed()
-        if self._process is None:
+        try:
+            self._end()
+        finally:
+            when_closed, self._when_closed = self._when_closed, None
+            if when_closed is not None:
+                when_closed()
+
+    def _end(self) -> None:
+        """Let the process stop the arm and end; kill it if it does not."""
+        process, connection = self._process, self._connection
+        if process is None or connection is None:
             return
         try:
-            self._ask(Close(), Done, ANSWER_S)
-            self._process.join(CLOSE_S)
+            if self._is_answer_due:
+                connection.close()  # a person broke in on a question: who finds the pipe closed stops the arm and ends
+            else:
+                self._ask(Close(), Done, ANSWER_S)
         except RobotError:
             pass  # it is ended below
-        self._kill()
+        self._await_end()
 
     def _ask(self, request: Request, expected: type[R], timeout_s: float) -> R:
         """Send a request and return its reply.
@@ -169,59 +222,91 @@ class ServoClient:
         Raises:
             RobotError: what the process raised, by its name; or it hangs, or is gone.
         """
-        if self._connection is None or self._is_leaving:
+        self._overhear()
+        if self._connection is None:
             raise NotEngagedError("servo process: expected one that runs, it has ended; connect and engage again")
-        self._overheard()
+        if self._is_leaving:
+            raise self._gone("it was asked nothing more")
         try:
+            self._is_answer_due = True
             self._connection.send_bytes(self._encode(request))
-            is_answered = self._connection.poll(timeout_s)
-            raw = self._connection.recv_bytes() if is_answered else b""
+            reply = self._answer(self._connection, expected, timeout_s)
+            self._is_answer_due = False
         except (EOFError, OSError) as error:
-            was_hung = self._watch is not None and self._watch.was_hung
-            self._kill()
-            if was_hung:
-                raise StaleStateError(
-                    f"servo process: expected a tick at least every {1e3 * HUNG_S:.0f} ms, none came; it was killed, "
-                    "the arm's own watchdog stops the arm"
-                ) from error
-            raise WireError(
-                f"servo process: expected an answer, it has ended ({error}); the arm's own watchdog stops the arm"
-            ) from error
-        if not is_answered:
+            raise self._gone(str(error)) from error
+        if reply is None:
             self._kill()
             raise StaleStateError(
                 f"servo process: expected an answer to {type(request).__name__} within {timeout_s:g} s, none came; it "
                 "was killed, the arm's own watchdog stops the arm"
             )
-        reply = self._decode(raw)
         if isinstance(reply, Failure):
             raise _error(reply)
         assert isinstance(reply, expected), f"{type(request).__name__} was answered by {type(reply).__name__}"
         return reply
 
-    def _overheard(self) -> StrideReply | None:
-        """Return what latched since the last time step, if anything did."""
-        if self._connection is None:
-            return None
-        try:
-            reply = self._decode(self._connection.recv_bytes()) if self._connection.poll(0.0) else None
-        except (EOFError, OSError):
-            return None  # whoever asks next says so
-        return reply if isinstance(reply, StrideReply) else None
+    def _answer(self, connection: Connection, expected: type[R], timeout_s: float) -> Reply | None:
+        """Return the next reply but what latched meanwhile, which is kept; None where none comes."""
+        while connection.poll(timeout_s):
+            reply = self._decode(connection.recv_bytes())
+            if isinstance(reply, Failure) and self._is_refusal_due:
+                self._is_refusal_due = False
+            elif not isinstance(reply, StrideReply):
+                return reply
+            elif expected is StrideReply:
+                self._is_refusal_due = not reply.is_asked
+                return reply
+            else:
+                self._take_in(reply)
+        return None
 
-    def _reap(self) -> None:
-        """Clear away a process that has ended, and one that is about to, in its time."""
-        if self._is_leaving and self._process is not None:
-            self._process.join(LEAVE_S)
-            self._kill()
-        elif self._process is not None and not self._process.is_alive():
-            self._kill()
+    def _gone(self, how: str) -> WireError:
+        """Clear away a process that has ended or lost its arm, and return the error that says so."""
+        why = f"{self._how_it_ended()} ({how})" if how else self._how_it_ended()
+        was_hung = self._watch is not None and self._watch.was_hung
+        self._await_end()
+        return StaleStateError(why) if was_hung else WireError(why)
+
+    def _how_it_ended(self) -> str:
+        if self._watch is not None and self._watch.was_hung:
+            return (
+                f"servo process: expected a tick at least every {1e3 * HUNG_S:.0f} ms, none came; it was killed, the "
+                "arm's own watchdog stops the arm"
+            )
+        return "servo process: expected an answer, it has ended; the arm's own watchdog stops the arm"
+
+    def _overhear(self) -> None:
+        """Take in what came unasked: what latched since the last time step, or the pipe's end."""
+        if self._connection is None or self._is_answer_due:
+            return
+        try:
+            while self._connection.poll(0.0):
+                reply = self._decode(self._connection.recv_bytes())
+                if isinstance(reply, StrideReply):
+                    self._take_in(reply)
+                else:
+                    self._is_refusal_due = False
+        except (EOFError, OSError):
+            self._is_leaving = True
+
+    def _take_in(self, told: StrideReply) -> None:
+        self._told = told
+        verdict = told.stride.verdict
+        self._is_leaving |= verdict is not None and verdict.reason in ENDING_REASONS
+
+    def _await_end(self) -> None:
+        """Let a process that nobody asks any more stop its arm and end; kill it if that takes too long."""
+        if self._process is not None:
+            self._process.join(CLOSE_S)
+        self._kill()
 
     def _kill(self) -> None:
+        if self._is_in_command:
+            self._why_lost, self._is_in_command = self._how_it_ended(), False
         process, self._process = self._process, None
         connection, self._connection = self._connection, None
         watch, self._watch = self._watch, None
-        self._is_leaving = False
+        self._is_leaving = self._is_answer_due = self._is_refusal_due = False
         if watch is not None:
             watch.close()
         if connection is not None:
@@ -230,6 +315,18 @@ class ServoClient:
             if process.is_alive():
                 process.kill()
             process.join(CLOSE_S)
+
+
+def _cut_short(state: ArmState, why: str) -> Stride:
+    """Return the time step that a process which is gone came to, as far as anybody knows: nothing."""
+    verdict = Verdict(
+        stamp_ns=state.stamp_ns, sequence=-1, outcome=Outcome.REFUSED, reason=Reason.STALE_STATE.value, detail=why,
+        is_latched=True,
+    )  # fmt: skip
+    return Stride(
+        before=state, after=state, is_begun=False, target_m=state.tcp_position_m, limiters=(), is_in_contact=False,
+        verdict=verdict,
+    )  # fmt: skip
 
 
 def _error(failure: Failure) -> RobotError:

@@ -1,5 +1,7 @@
 """What crosses the pipe between a station and its servo process."""
 
+from typing import Any
+
 import msgspec
 
 from robot.messages import ArmState, GripCommand, Intent, PlantIdentity
@@ -21,6 +23,8 @@ __all__ = [
     "Stop",
     "StrideReply",
     "StrideRequest",
+    "pack_intent",
+    "unpack_intent",
 ]
 
 
@@ -49,7 +53,8 @@ class BeginEpoch(_Tagged, frozen=True, kw_only=True):
 class StrideRequest(_Tagged, frozen=True, kw_only=True):
     """Carry out an intent for so many ticks; answered by StrideReply when they are over."""
 
-    intent: Intent
+    intent: msgspec.Raw
+    """As pack_intent makes it: whatever was asked for crosses, for it is the gate that refuses it."""
     grip: GripCommand
     n_ticks: int
     is_hand_busy: bool
@@ -88,6 +93,8 @@ class StrideReply(_Tagged, frozen=True, kw_only=True):
     """What the time step came to."""
 
     stride: Stride
+    is_asked: bool = True
+    """It answers a request; otherwise it tells what latched between time steps."""
 
 
 class Done(_Tagged, frozen=True, kw_only=True):
@@ -102,3 +109,22 @@ class Failure(_Tagged, frozen=True, kw_only=True):
 
 
 Reply = Connected | Seeded | Outputs | StrideReply | Done | Failure
+
+
+def pack_intent(intent: object) -> msgspec.Raw:
+    """Return what crosses for an intent, or for what somebody took for one; for what cannot cross, nothing does."""
+    try:
+        return msgspec.Raw(msgspec.msgpack.encode(intent))
+    except TypeError:
+        return msgspec.Raw(msgspec.msgpack.encode(None))
+
+
+def unpack_intent(packed: msgspec.Raw) -> Any:  # noqa: ANN401 - what is no intent is told by the gate
+    """Return the intent that crossed; what is none comes as plain values, which the gate refuses."""
+    try:
+        return _intent_of(packed)
+    except msgspec.ValidationError:
+        return msgspec.msgpack.decode(packed)
+
+
+_intent_of = msgspec.msgpack.Decoder(Intent).decode

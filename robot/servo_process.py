@@ -3,10 +3,14 @@
 Between intents it holds the arm at rest, so that the controller's watchdog is fed by commands that passed the gate, and
 by nothing else. When the pipe to its station closes it stops the arm and ends. After a loss of the arm it ends too,
 at once where nothing is known of the arm any more: the client library must never get the chance to reconnect and go on
-by itself. What latched is told before the arm is stopped, for a stop takes its time.
+by itself. What latched is told before the arm is stopped, for a stop takes its time. Ctrl-C at the terminal is the
+station's to decide on: this process is in a group of its own, so that it does not vanish from under an epoch that is
+to be finished.
 """
 
 import os
+import signal
+import sys
 from collections.abc import Callable, MutableSequence
 from multiprocessing.connection import Connection
 
@@ -35,6 +39,7 @@ from robot.servo_messages import (
     Stop,
     StrideReply,
     StrideRequest,
+    unpack_intent,
 )
 from robot.tick_loop import TickLoop
 
@@ -47,6 +52,7 @@ LOST = Reason.STALE_STATE.value
 ENDING_REASONS = (LOST, Reason.ARM_REFUSED.value, Reason.WIRE.value)
 """After these the process ends."""
 LOST_CODE = 3
+EXIT_TERMINATED = 143
 NOT_TICKING = 0
 
 
@@ -57,9 +63,13 @@ def serve(connection: Connection, resolved_json: bytes, pulse: MutableSequence[i
         connection: the pipe to the station.
         resolved_json: everything the rig is made of.
         pulse: shared memory of one number: ticks so far while it ticks, otherwise 0.
+
+    SIGTERM stops the arm and ends it too.
     """
+    os.setpgrp()
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(EXIT_TERMINATED))
     resolved = msgspec.json.decode(resolved_json, type=Resolved)
-    plant = build_plant(rig=resolved.rig, arm=resolved.arm, scenario=resolved.scenario)
+    plant = build_plant(rig=resolved.rig, arm=resolved.arm, scenario=resolved.scenario, cell=resolved.cell)
     server: ServoServer
 
     def latched(verdict: Verdict) -> None:
@@ -86,8 +96,9 @@ def serve(connection: Connection, resolved_json: bytes, pulse: MutableSequence[i
     except (EOFError, OSError, KeyboardInterrupt):
         pass  # the station is gone; the arm is stopped below
     finally:
+        pulse[0] = NOT_TICKING  # stopping takes longer than a process may go without a tick while it ticks
+        connection.close()  # first: the station is to know at once that nobody answers any more
         loop.close()
-        connection.close()
 
 
 class ServoServer:
@@ -116,7 +127,7 @@ class ServoServer:
         self._pulse, self._die = pulse, die
         self._decode = msgspec.msgpack.Decoder(Request).decode
         self._encode = msgspec.msgpack.Encoder().encode
-        self._is_in_command = self._is_over = False
+        self._is_in_command = self._is_over = self._is_beginning = False
         self._grip: GripCommand | None = None
         self._n_left = self._n_ticks = 0
 
@@ -135,7 +146,8 @@ class ServoServer:
         self._pulse[0] = NOT_TICKING
         is_begun, self._n_left = self._n_left > 0, 0
         self._is_in_command = False
-        self._send(StrideReply(stride=self._loop.report(verdict, is_begun=is_begun)))
+        stride = self._loop.report(verdict, is_begun=is_begun)
+        self._send(StrideReply(stride=stride, is_asked=is_begun or self._is_beginning))
         if verdict.reason == LOST:
             self._die()
         self._is_over = verdict.reason in ENDING_REASONS
@@ -169,7 +181,10 @@ class ServoServer:
             self._send(Failure(kind=SafetyError.__name__, message="expected an engaged arm; engage and seed it first"))
             return
         self._grip = request.grip
-        verdict = self._loop.begin(request.intent, n_ticks=request.n_ticks, is_hand_busy=request.is_hand_busy)
+        self._is_beginning = True
+        intent = unpack_intent(request.intent)
+        verdict = self._loop.begin(intent, n_ticks=request.n_ticks, is_hand_busy=request.is_hand_busy)
+        self._is_beginning = False
         if verdict is None:
             self._n_left = request.n_ticks
 

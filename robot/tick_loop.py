@@ -77,12 +77,18 @@ class TickLoop:
         self._gate = Gate(arm=arm, limits=limits, chain=ToolChain(config), when_latched=when_latched)
         self._tick_s, self._tick_ns = rig.tick_s, round(rig.tick_s * 1e9)
         self.state: ArmState
+        self._read_ns = 0
         self._before: ArmState
 
     @property
     def is_in_contact(self) -> bool:
         """Whether something holds the tool up."""
         return self._mover.is_in_contact
+
+    @property
+    def why_lost(self) -> str | None:
+        """Nothing: what runs in this process cannot end without it, and latches only in a time step."""
+        return None
 
     def connect(self) -> None:
         """Acquire the arm. Moves nothing."""
@@ -91,6 +97,10 @@ class TickLoop:
     def engage(self) -> None:
         """Take command of the arm, after somebody has armed it."""
         self._arm.engage()
+
+    def stop(self) -> None:
+        """Stop the arm; it must be seeded again before anything moves."""
+        self._arm.stop()
 
     def close(self) -> None:
         """Stop and release the arm. Idempotent, never raises."""
@@ -103,7 +113,7 @@ class TickLoop:
 
     def seed(self) -> ArmState:
         """Start everything from the measured state, and return it."""
-        state = self.state = self._before = self._arm.read()
+        state = self._before = self._read_now()
         self._gate.seed(state)
         self._mover.seed(state)
         return state
@@ -161,15 +171,18 @@ class TickLoop:
             verdict = gate.write(command, state, now_ns=now_ns)
             if verdict is None:
                 arm.clock.wait_tick()
-                self.state = arm.read()
+                self._read_now()
         except WireError as error:
             return gate.latch(_reason_of(error), str(error), now_ns=now_ns)
         return verdict
 
     def _read(self, now_ns: int) -> ArmState:
-        """Return the newest state; in lock-step the last one still is."""
-        if now_ns - self.state.stamp_ns >= self._tick_ns:
-            self.state = self._arm.read()
+        """Return the newest state, which the one read at the end of the tick before is, unless time passed since."""
+        return self._read_now() if now_ns - self._read_ns >= self._tick_ns else self.state
+
+    def _read_now(self) -> ArmState:
+        self._read_ns = self._arm.clock.now_ns()
+        self.state = self._arm.read()
         return self.state
 
     def report(self, verdict: Verdict | None, *, is_begun: bool) -> Stride:

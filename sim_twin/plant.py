@@ -8,12 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from config.arm import ArmConfig
+from config.cell import CellConfig
 from config.rig import Rig
 from config.scenario import Scenario
 from robot.clock import LockStepClock
 from robot.errors import NotEngagedError, StaleStateError
 from robot.hal.protocols import Arm, Camera, Clock, Resetter, SceneTruth
 from robot.kinematics import Kinematics
+from robot.layout import Layout, draw_layout
 from robot.messages import (
     ArmCommand,
     ArmMode,
@@ -28,7 +30,6 @@ from robot.messages import (
     Vec3,
     Vec6,
 )
-from sim_twin.layout import Layout, draw_layout
 from sim_twin.names import on_table
 from sim_twin.scene import build_scene
 from sim_twin.table import TableDrive
@@ -270,7 +271,8 @@ class TwinResetter:
 class TwinPlant:
     """A world in MuJoCo: one arm, one table."""
 
-    def __init__(self, *, arm: ArmConfig, scenario: Scenario, rig: Rig) -> None:
+    def __init__(self, *, arm: ArmConfig, scenario: Scenario, rig: Rig, cell: CellConfig | None = None) -> None:
+        del cell  # signals are the table's own here: there are no terminals between
         self._world = TwinWorld(arm, scenario, rig)
         self.identity = PlantIdentity(kind=PlantKind.TWIN, model=arm.name, serial="twin")
         self.arm: Arm = TwinArm(self._world)

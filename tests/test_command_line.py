@@ -58,7 +58,16 @@ COMMANDS = {
     "wire_fault": f"{HERE}:wire_fault",
     "absent": "no_such_package.cli:app",
 }
-BENCHES = {"good": f"{HERE}:bench_good", "bad": f"{HERE}:bench_bad", "of_run": f"{HERE}:bench_of_run"}
+
+
+def bench_of_any_length(*, full: bool, seconds=None) -> BenchReport:
+    return bench_report("of_any_length", [BenchResult(name="length", value=seconds or 9.0, unit="s")], seconds=0.1)
+
+
+BENCHES = {
+    "good": f"{HERE}:bench_good", "bad": f"{HERE}:bench_bad", "of_run": f"{HERE}:bench_of_run",
+    "of_any_length": f"{HERE}:bench_of_any_length",
+}  # fmt: skip
 
 
 @pytest.fixture
@@ -108,7 +117,16 @@ def test_a_sub_command_whose_module_is_missing_says_so_and_leaves_the_others_alo
 
 
 @pytest.mark.parametrize(
-    "arguments", [[], ["none"], ["--none"], ["bench"], ["bench", "none"], ["bench", "good", "runs/1"]]
+    "arguments",
+    [
+        [],
+        ["none"],
+        ["--none"],
+        ["bench"],
+        ["bench", "none"],
+        ["bench", "good", "runs/1"],
+        ["bench", "good", "--seconds", "3"],
+    ],
 )
 def test_bad_usage_exits_2(call, arguments):
     assert call(*arguments).exit_code == 2
@@ -143,6 +161,12 @@ def test_a_row_that_misses_its_goal_exits_1_and_is_marked(call):
 def test_a_bench_that_reads_a_run_is_handed_it(call):
     result = call("bench", "of_run", "runs/7", "--json")
     assert json.loads(result.stdout)["results"][0]["name"] == "runs/7"
+
+
+def test_a_bench_that_takes_any_length_is_told_it(call):
+    for arguments, length in ((["--seconds", "3"], 3.0), ([], 9.0)):
+        result = call("bench", "of_any_length", "--json", *arguments)
+        assert json.loads(result.stdout)["results"][0]["value"] == length
 
 
 def test_the_benches_can_be_listed(call):

@@ -9,6 +9,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from config.arm import ArmConfig
+from config.cell import CellConfig
 from config.rig import Rig
 from config.scenario import Scenario
 from robot.clock import LockStepClock
@@ -213,7 +214,8 @@ class FakeResetter:
 class FakePlant:
     """A plant for tests of everything above it."""
 
-    def __init__(self, *, arm: ArmConfig, scenario: Scenario, rig: Rig) -> None:
+    def __init__(self, *, arm: ArmConfig, scenario: Scenario, rig: Rig, cell: CellConfig | None = None) -> None:
+        del cell  # signals are the table's own here: there are no terminals between
         self.identity = PlantIdentity(kind=PlantKind.FAKE, model=arm.name, serial="fake")
         self.arm = FakeArm(arm=arm, tick_s=rig.tick_s)
         self.cameras: Mapping[str, Camera] = {}

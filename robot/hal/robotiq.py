@@ -60,6 +60,7 @@ class RobotiqGripper:
 
     Attributes:
         state: What the gripper last said; None before its first answers.
+        n_answers: How often it has said it.
     """
 
     def __init__(self, scale: GripScale) -> None:
@@ -72,13 +73,17 @@ class RobotiqGripper:
         self._is_query_out = False
         self._n_silent = 0
         self.state: GripState | None = None
+        self.n_answers = 0
 
     def connect(self, host: str, *, timeout_s: float = 2.0) -> None:
-        """Open the connection. Moves nothing.
+        """Open the connection; what was said on one before counts no more. Moves nothing.
 
         Raises:
             WireError: nobody listens there.
         """
+        self._received = self._outgoing = b""
+        self._said.clear()
+        self._asked, self._is_query_out, self._n_silent, self.state = None, False, 0, None
         try:
             self._socket = socket.create_connection((host, GRIPPER_PORT), timeout=timeout_s)
         except OSError as error:
@@ -108,20 +113,20 @@ class RobotiqGripper:
             self._send(f"SET SPE {speed} FOR {force} POS {position} GTO 1\n")
 
     def poll(self) -> GripState | None:
-        """Take in answers, ask the next question, and return the newest state.
+        """Ask the next question or take in answers, in turn, and return the newest state.
 
         Raises:
             WireError: the gripper closed the connection or has been silent for too long.
         """
         self._flush()
-        self._receive()
         if not self._is_query_out:
             self._send("GET POS\nGET OBJ\nGET STA\nGET ACT\n")
             self._is_query_out, self._n_silent = True, 0
-        else:
-            self._n_silent += 1
-            if self._n_silent > SILENT_LIMIT:
-                raise WireError(f"gripper: expected an answer within {SILENT_LIMIT} polls, got none; is it powered?")
+            return self.state
+        self._receive()
+        self._n_silent += 1
+        if self._is_query_out and self._n_silent > SILENT_LIMIT:
+            raise WireError(f"gripper: expected an answer within {SILENT_LIMIT} polls, got none; is it powered?")
         return self.state
 
     def close(self) -> None:
@@ -167,6 +172,7 @@ class RobotiqGripper:
         self._said[words[0]] = int(words[1])
         if words[0] == "ACT":  # the last of the four questions
             self._is_query_out = False
+            self.n_answers += 1
             self._tell()
 
     def _tell(self) -> None:

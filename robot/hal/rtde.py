@@ -16,40 +16,28 @@ from rtde_control import RTDEControlInterface
 from rtde_receive import RTDEReceiveInterface
 
 from config.arm import ArmConfig
-from robot.errors import ArmRefusedError, NotEngagedError, RobotError, StaleStateError, WireError
+from config.cell import CellConfig
+from robot.errors import NotEngagedError, RobotError, StaleStateError, WireError
 from robot.geometry import quat_of_rotation_vector
 from robot.hal.link_watch import LinkWatch
+from robot.hal.pins import Pins
+from robot.hal.protocols import Clock
 from robot.hal.robotiq import GripScale, RobotiqGripper
 from robot.hal.rtde_clock import RtdeClock
 from robot.hal.rtde_outputs import N_OUTPUTS, DigitalOutputs
-from robot.hal.ur_checks import check_facts, check_pose
+from robot.hal.rtde_set_up import arm_watchdog, prove_watchdog, require, set_tool, status_of
+from robot.hal.ur_checks import check_facts, check_pose, check_serial
 from robot.hal.ur_primary import read_facts
-from robot.hal.ur_state import (
-    Runtime,
-    UrStatus,
-    check_ready,
-    check_version,
-    is_well,
-    mode_of,
-    parse_version,
-    why_refused,
-)
-from robot.messages import ArmCommand, ArmSpec, ArmState, Vec6
+from robot.hal.ur_state import Runtime, UrStatus, check_ready, check_version, mode_of, parse_version
+from robot.messages import ArmCommand, ArmSpec, ArmState, GripState, Vec6
 
 __all__ = ["RtdeArm"]
 
 RATE_HZ = 500.0
-STALE_NS = 50_000_000
-WATCHDOG_HZ = 10.0
-"""Commands that come less often stop the program on the controller's side."""
-PROOF_S = 0.5
-"""Time on the controller's clock in which an armed and starved watchdog must have stopped the program."""
-PROOF_WALL_S = 5.0
-PAYLOAD_TOLERANCE_KG, TCP_TOLERANCE = 0.05, 1e-4
+STALE_NS, HAND_NS = 50_000_000, 40_000_000
 RTDE_PORT = 30004
 WRITE_NS = 35_000_000
 """A command that took longer was no mere sending: the client may have reconnected in it, which takes 40 ms at least."""
-REASON_TICKS = 5
 STOP_RAD_S2, REST_S, STILL_RAD_S = 10.0, 1.0, 0.01
 START_S = 2.0
 
@@ -57,12 +45,16 @@ START_S = 2.0
 class RtdeArm:
     """One UR5e with a Robotiq hand (robot.hal.protocols.Arm)."""
 
-    def __init__(self, *, arm: ArmConfig, address: str) -> None:
+    def __init__(
+        self, *, arm: ArmConfig, address: str, serial: str | None = None, cell: CellConfig | None = None
+    ) -> None:
         """Store. Nothing is acquired.
 
         Args:
             arm: the arm's file.
             address: host or IP address of the controller.
+            serial: the number that it must say it has; None takes any.
+            cell: where the control box has the table's signals; straight through where None.
         """
         joints = arm.joints
         self.spec = ArmSpec(
@@ -70,17 +62,19 @@ class RtdeArm:
             q_min_rad=_vec6([j.range_rad[0] for j in joints]), q_max_rad=_vec6([j.range_rad[1] for j in joints]),
             qd_max_rad_s=_vec6([j.speed_rad_s for j in joints]), grip_stroke_m=arm.tool.stroke_m,
         )  # fmt: skip
-        self.clock = RtdeClock()
+        self._pace = RtdeClock()
+        self.clock: Clock = self._pace
         self.address = address
         self.serial = ""
         """As the controller says, from connect() on."""
-        self._arm = arm
+        self._arm, self._expected_serial = arm, serial
         self._receive: RTDEReceiveInterface | None = None
         self._dashboard: DashboardClient | None = None
         self._control: RTDEControlInterface | None = None
         self._outputs: DigitalOutputs | None = None
         self._gripper = RobotiqGripper(GripScale.of(arm.tool))
-        self._last_timestamp, self._seen_ns = -1.0, 0
+        self._last_timestamp, self._seen_ns, self._polled_ns = -1.0, 0, 0
+        self._pins = Pins(cell)
         self._links = LinkWatch(address, RTDE_PORT)
         self._is_lost = False
         self._runtime = Runtime.STOPPED
@@ -93,7 +87,7 @@ class RtdeArm:
 
         Raises:
             WireError: somebody does not answer.
-            RobotConfigError: another model or software than this backend is for.
+            RobotConfigError: another arm than the rig names, another model or software than this backend is for.
         """
         if self._receive is not None:
             return
@@ -102,15 +96,17 @@ class RtdeArm:
         with _named("dashboard", self.address):
             dashboard.connect()
             version = parse_version(dashboard.polyscopeVersion())
+            self.serial = dashboard.getSerialNumber().strip()
+        if self._expected_serial is not None:
+            check_serial(self.serial, self._expected_serial, self.address)
         check_version(version)
         check_facts(facts, self._arm)
         check_pose(facts)
         with _named("RTDE", self.address):
             self._receive = RTDEReceiveInterface(self.address, RATE_HZ)
-            self.serial = dashboard.getSerialNumber().strip()
         self._dashboard = dashboard
         self._gripper.connect(self.address)
-        self.clock.pace_by(self._receive)
+        self._pace.pace_by(self._receive)
         self._wait_first_state()
 
     def engage(self) -> None:
@@ -126,13 +122,14 @@ class RtdeArm:
             return
         receive, dashboard = self._reading()
         check_ready(self.status(), is_remote=_is_remote(dashboard))
-        self._prove_watchdog(self._take_control())
+        prove_watchdog(self._take_control(), receive, self.clock)
         self._control = self._take_control()
         try:
             self._set_up(self._control, receive)
             self._links.look()
         except (RobotError, RuntimeError):
-            self._drop_control()  # an arm that was set up by half is nobody's: the next engage begins anew
+            # An arm that was set up by half is nobody's: the next engage begins anew.
+            self._drop_control(is_in_traceback=True)
             raise
 
     # ------------------------------------------------------------------------------------------------ read and write
@@ -147,7 +144,7 @@ class RtdeArm:
         receive, _ = self._reading()
         self._require_link()
         self._note_freshness(receive)
-        grip = self._gripper.poll()
+        grip = self._poll_hand()
         if grip is None:
             raise StaleStateError("arm: expected a state of the hand, none came yet")
         status = self.status()
@@ -162,8 +159,8 @@ class RtdeArm:
             tcp_quat=quat_of_rotation_vector(rx, ry, rz),
             tcp_force_n=(fx, fy, fz),
             grip=grip,
-            digital_in=receive.getActualDigitalInputBits() & _ALL_BITS,
-            digital_out=receive.getActualDigitalOutputBits() & _ALL_BITS,
+            digital_in=self._pins.signals_in(receive.getActualDigitalInputBits() & _ALL_BITS),
+            digital_out=self._pins.signals_out(receive.getActualDigitalOutputBits() & _ALL_BITS),
             mode=mode_of(status),
         )
 
@@ -193,7 +190,8 @@ class RtdeArm:
         self._require(taken, "servoJ")
         self._gripper.command(command.grip)
         assert self._outputs is not None, "engage made it"
-        untaken = self._outputs.put(command.digital_out)
+        pins = self._pins.pins_out(command.digital_out, self._outputs.bits, now_ns=monotonic_ns())
+        untaken = self._outputs.put(pins)
         self._require(untaken is None, f"digital output {untaken}")
 
     def stop(self) -> bool:
@@ -216,10 +214,8 @@ class RtdeArm:
         if self._receive is None:
             return
         self.stop()
-        self.clock.pace_by(None)
-        receive, dashboard, self._receive, self._dashboard = self._receive, self._dashboard, None, None
-        with suppress(RuntimeError):
-            receive.disconnect()
+        self._pace.pace_by(None)
+        dashboard, self._receive, self._dashboard = self._dashboard, None, None  # see _drop_control
         with suppress(RuntimeError):
             if dashboard is not None:
                 dashboard.disconnect()
@@ -228,12 +224,7 @@ class RtdeArm:
     def status(self) -> UrStatus:
         """Return what the controller said last of its modes."""
         receive, _ = self._reading()
-        return UrStatus(
-            robot_mode=receive.getRobotMode(),
-            safety_bits=receive.getSafetyStatusBits(),
-            runtime=int(receive.getRuntimeState()),
-            speed_fraction=receive.getTargetSpeedFraction(),
-        )
+        return status_of(receive)
 
     # -------------------------------------------------------------------------------------------------------- inside
 
@@ -261,6 +252,16 @@ class RtdeArm:
                 f"arm: expected a state every 2 ms, the newest is {age_ms:.0f} ms old; is the link up?"
             )
 
+    def _poll_hand(self) -> GripState | None:
+        """Return what the hand says; after a pause wait for what it says now, the next answer being of before."""
+        now_ns, hand = monotonic_ns(), self._gripper
+        is_late, self._polled_ns = now_ns - self._polled_ns > STALE_NS, now_ns
+        fresh, deadline_ns = hand.n_answers + 2, now_ns + HAND_NS
+        while is_late and hand.n_answers < fresh and monotonic_ns() < deadline_ns:
+            hand.poll()
+            self.clock.wait_tick()
+        return hand.poll()
+
     def _wait_first_state(self) -> None:
         deadline_ns = monotonic_ns() + round(START_S * 1e9)
         while True:
@@ -277,44 +278,21 @@ class RtdeArm:
         with _named("RTDE control", self.address):
             return RTDEControlInterface(self.address, RATE_HZ, RTDEControlInterface.FLAG_UPLOAD_SCRIPT)
 
-    def _prove_watchdog(self, control: RTDEControlInterface) -> None:
-        """Arm the controller's watchdog, starve it, and see the program end. Nothing has moved yet."""
-        self._require(control.setWatchdog(WATCHDOG_HZ), "setWatchdog")
-        receive, _ = self._reading()
-        begun_s, deadline_ns = receive.getTimestamp(), monotonic_ns() + round(PROOF_WALL_S * 1e9)
-        while receive.getTimestamp() - begun_s < PROOF_S and monotonic_ns() < deadline_ns:
-            self.clock.wait_tick()
-            if self.status().runtime == Runtime.STOPPED:
-                control.disconnect()
-                return
-        control.stopScript()
-        control.disconnect()
-        raise ArmRefusedError(
-            f"expected the controller's watchdog to end a program that is silent for {1e3 / WATCHDOG_HZ:.0f} ms, "
-            f"it ran on for {PROOF_S:g} s: do not move this arm"
-        )
-
     def _set_up(self, control: RTDEControlInterface, receive: RTDEReceiveInterface) -> None:
-        """Set payload and tool centre point, read both back, open the outputs and the hand, arm the watchdog last."""
-        tool = self._arm.tool
-        tcp = [*tool.tcp_m, 0.0, 0.0, 0.0]
-        self._require(control.setPayload(tool.mass_kg, list(tool.com_m)), "setPayload")
-        self._require(control.setTcp(tcp), "setTcp")
-        if any(abs(a - b) > TCP_TOLERANCE for a, b in zip(control.getTCPOffset(), tcp, strict=True)):
-            raise ArmRefusedError(f"expected tool centre point {tcp}, the controller says {control.getTCPOffset()}")
-        deadline_ns = monotonic_ns() + round(PROOF_S * 1e9)
-        while abs(receive.getPayload() - tool.mass_kg) > PAYLOAD_TOLERANCE_KG:
-            if monotonic_ns() > deadline_ns:
-                raise ArmRefusedError(f"expected payload {tool.mass_kg} kg, the controller says {receive.getPayload()}")
-            self.clock.wait_tick()
+        """Set payload and tool centre point, open the outputs and the hand, arm the watchdog last."""
+        set_tool(control, receive, self.clock, self._arm.tool)
         self._outputs = DigitalOutputs(self.address, bits=receive.getActualDigitalOutputBits() & _ALL_BITS)
+        self._pins.forget()
         if not self._gripper.is_active:
             self._gripper.activate()
-        # From here on somebody must write: a command every 100 ms at least, or the program ends.
-        self._require(control.setWatchdog(WATCHDOG_HZ), "setWatchdog")
+        arm_watchdog(control, receive, self.clock)  # from here on somebody must write
 
-    def _drop_control(self) -> None:
-        """End the program and forget its client: it must never get the chance to go on by itself."""
+    def _drop_control(self, *, is_in_traceback: bool = False) -> None:
+        """End the program and forget its client: it must never get the chance to go on by itself.
+
+        A client disconnects when its last reference goes, and sleeps half a second each time it does. So it is told to
+        only where a traceback keeps it alive.
+        """
         self._links.forget()
         control, self._control = self._control, None
         outputs, self._outputs = self._outputs, None
@@ -324,10 +302,13 @@ class RtdeArm:
             with suppress(RuntimeError, WireError):
                 self._runtime = self.status().runtime
             self._end_program()
+        if outputs is not None:
+            with suppress(RuntimeError):
+                outputs.put(self._pins.rested(outputs.bits))
+            outputs.close()
+        if control is not None and is_in_traceback:
             with suppress(RuntimeError):
                 control.disconnect()
-        if outputs is not None:
-            outputs.close()
 
     def _end_program(self) -> None:
         """End what a stop has only paused: nothing may go on by itself when somebody releases the stop."""
@@ -336,15 +317,7 @@ class RtdeArm:
                 self._dashboard.stop()
 
     def _require(self, is_taken: bool, what: str) -> None:
-        if is_taken:
-            return
-        status = self.status()
-        for _ in range(REASON_TICKS):  # the reason may come a moment after the refusal
-            if not is_well(status):
-                break
-            self.clock.wait_tick()
-            status = self.status()
-        raise ArmRefusedError(f"{what}: the controller did not take it: {why_refused(status)}")
+        require(is_taken, what, receive=self._reading()[0], clock=self.clock)
 
     def _wait_rest(self) -> bool:
         """Wait until the joints rest, at most REST_S. Returns whether they do."""

@@ -17,21 +17,26 @@ class DigitalOutputs:
         address: the controller's.
         bits: the outputs as they are.
 
+    Attributes:
+        bits: The outputs as the controller took them last.
+
     Raises:
         RuntimeError: the client cannot connect.
     """
 
     def __init__(self, address: str, *, bits: int) -> None:
         self._client = RTDEIOInterface(address)
-        self._bits = bits
+        self.bits = bits
 
     def put(self, bits: int) -> int | None:
         """Switch the outputs that differ; return the first that the controller did not take, None where it took all."""
-        changed = self._bits ^ bits
+        changed = self.bits ^ bits
         for i in range(N_OUTPUTS):
-            if changed >> i & 1 and not self._switch(i, is_on=bool(bits >> i & 1)):
+            if not changed >> i & 1:
+                continue
+            if not self._switch(i, is_on=bool(bits >> i & 1)):
                 return i
-        self._bits = bits
+            self.bits ^= 1 << i
         return None
 
     def close(self) -> None:

@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 
 from config.arm import ArmConfig
+from config.cell import CellConfig
 from config.rig import Rig
 from config.scenario import Scenario
 from robot.errors import RobotConfigError
@@ -15,10 +16,25 @@ from robot.messages import PlantIdentity
 __all__ = ["RtdePlant"]
 
 
+class _NoResetter:
+    """A robot lays no table out: whoever does is reached by other ways, on the bus or in person."""
+
+    def reset(self, *, seed: int, epoch: int, digital_out: int) -> None:
+        """Refuse.
+
+        Raises:
+            RobotConfigError: always.
+        """
+        raise RobotConfigError(
+            f"reset (seed {seed}, epoch {epoch}, outputs {digital_out:b}): expected somebody who lays the table out, "
+            "the arm's controller cannot; give the rig a bus with a twin on it"
+        )
+
+
 class RtdePlant:
     """A UR5e at an address: real, or a virtual controller on this machine's loopback."""
 
-    def __init__(self, *, arm: ArmConfig, scenario: Scenario, rig: Rig) -> None:
+    def __init__(self, *, arm: ArmConfig, scenario: Scenario, rig: Rig, cell: CellConfig | None = None) -> None:
         """Store. Nothing is acquired.
 
         Raises:
@@ -29,10 +45,10 @@ class RtdePlant:
         if round(rig.tick_s * 1e9) != TICK_NS:
             raise RobotConfigError(f"rig {rig.name}: expected tick_s 0.002, as the arm's, came {rig.tick_s}")
         self._kind, self._scenario = kind_of_address(rig.address), scenario
-        self.arm = RtdeArm(arm=arm, address=rig.address)
+        self.arm = RtdeArm(arm=arm, address=rig.address, serial=rig.expected.serial, cell=cell)
         self.cameras: Mapping[str, Camera] = {}
         self.truth: SceneTruth | None = None
-        self.resetter: Resetter
+        self.resetter: Resetter = _NoResetter()
 
     @property
     def identity(self) -> PlantIdentity:

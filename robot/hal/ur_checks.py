@@ -10,13 +10,26 @@ from robot.errors import RobotConfigError
 from robot.geometry import quat_of_rotation_vector
 from robot.hal.ur_primary import ArmFacts
 
-__all__ = ["check_facts", "check_pose", "flange_pose"]
+__all__ = ["check_facts", "check_pose", "check_serial", "flange_pose"]
 
 CALIBRATION_M, CALIBRATION_RAD = 0.01, 0.05
 """Farther than this from nominal is no calibration of this model. A UR5e's own lie within some millimetres and mrad; a
 and d of joints 2 and 3 may be shifted against one another far more, so that only their sum is compared."""
 POSE_M, POSE_RAD = 1e-4, 1e-3
 LIMIT_RAD = 1e-3
+
+
+def check_serial(found: str, expected: str, address: str) -> None:
+    """Refuse an arm with another serial number than the rig names.
+
+    Raises:
+        RobotConfigError: both numbers, and where.
+    """
+    if found != expected:
+        raise RobotConfigError(
+            f"expected the arm with serial {expected}, as the rig names it, found {found} at {address}: is the address "
+            "another arm's?"
+        )
 
 
 def check_facts(facts: ArmFacts, arm: ArmConfig) -> None:

@@ -1,17 +1,26 @@
-"""The twin on the bus: its truth 100 times a second, and resets of its table. Polled by the controller's loop."""
+"""The twin on the bus: its truth 100 times a second, and resets of its table. Polled by the controller's loop.
+
+Whoever resets the table of a cell also looks after an arm that has stopped: a protective stop is unlocked, when five
+seconds have passed since, and the program that it interrupted is ended, before the table is laid out. Other stops stay.
+"""
 
 import msgspec
 import zenoh
 
-from robot.bus import RESET, TRUTH, ResetRequest, open_session, topic
+from robot.bus import CELL, RESET, TRUTH, CellAction, ResetRequest, open_session, topic
 from robot.messages import SceneState
 from sim_twin.controller.robot import VirtualRobot
+from sim_twin.controller.states import RuntimeState
+from sim_twin.controller.table_hands import TableHands
+from sim_twin.controller.wire.dashboard_target import Outcome
 from sim_twin.plant import TwinTruth
 
 __all__ = ["BusPort"]
 
 TRUTH_SLICES = 5
 N_WAITING = 8
+PATIENCE_SLICES = 500
+"""How long a program may take to end after it was stopped at the pendant."""
 
 
 class BusPort:
@@ -35,13 +44,23 @@ class BusPort:
             topic(serial, TRUTH), congestion_control=zenoh.CongestionControl.DROP, express=True
         )
         self._queries = self._session.declare_queryable(self._key, zenoh.handlers.FifoChannel(N_WAITING))
+        self._cell_key = topic(serial, CELL)
+        self._actions = self._session.declare_queryable(self._cell_key, zenoh.handlers.FifoChannel(N_WAITING))
+        self._hands = TableHands(robot.machine.world)
+        self._n_patience = 0
+        self._asked: zenoh.Query | None = None
+        """A reset that waits for the arm to be unlocked."""
         self._encode = msgspec.json.Encoder().encode
 
     def tick(self, n_slices: int) -> None:
         """Answer what was asked, and publish when it is time."""
-        query = self._queries.try_recv()
+        query = self._asked or self._queries.try_recv()
+        self._asked = None
         if query is not None:
             self._answer(query)
+        action = self._actions.try_recv()
+        if action is not None:
+            self._act(action)
         if n_slices % TRUTH_SLICES == 0:
             self._publisher.put(self._encode(self._read()))
 
@@ -53,12 +72,39 @@ class BusPort:
         return self._truth.read()
 
     def _answer(self, query: zenoh.Query) -> None:
+        robot, modes = self._robot, self._robot.machine.modes
+        if modes.is_stopped_by_safety:
+            if robot.panel.unlock_protective_stop() is Outcome.TOO_EARLY:
+                self._asked = query
+                return
+            robot.panel.stop()
+            self._n_patience = PATIENCE_SLICES
+        if self._n_patience and modes.runtime is not RuntimeState.STOPPED:
+            self._asked = query
+            self._n_patience -= 1
+            return
+        self._n_patience = 0
         with query:
             try:
-                payload = b"" if query.payload is None else query.payload.to_bytes()
-                asked = msgspec.json.decode(payload, type=ResetRequest)
-                self._robot.lay_out(seed=asked.seed, epoch=asked.epoch, digital_out=asked.digital_out)
+                asked = msgspec.json.decode(_payload(query), type=ResetRequest)
+                robot.lay_out(seed=asked.seed, epoch=asked.epoch, digital_out=asked.digital_out)
             except (msgspec.DecodeError, ValueError) as error:
                 query.reply_err(f"reset: {error}")
             else:
+                self._hands.let_go()
                 query.reply(self._key, b"")
+
+    def _act(self, query: zenoh.Query) -> None:
+        with query:
+            try:
+                asked = msgspec.json.decode(_payload(query), type=CellAction)
+                if asked.name:
+                    self._hands.act(asked.name, is_on=asked.is_on)
+            except (msgspec.DecodeError, ValueError) as error:
+                query.reply_err(f"cell: {error}")
+            else:
+                query.reply(self._cell_key, self._encode(self._hands.look()))
+
+
+def _payload(query: zenoh.Query) -> bytes:
+    return b"" if query.payload is None else query.payload.to_bytes()

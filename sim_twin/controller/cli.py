@@ -25,6 +25,9 @@ def controller(
     bus: Annotated[
         str, typer.Option("--bus", help="Zenoh endpoint for truth and resets, e.g. tcp/127.0.0.2:7447.")
     ] = "",
+    cell: Annotated[
+        str, typer.Option("--cell", help="How the table is wired to the control box: a shipped cell's name or a file.")
+    ] = "ur_box",
     script: Annotated[Path | None, typer.Option("--script", help="URScript file to run at the start.")] = None,
 ) -> None:
     """Run a virtual UR controller until Ctrl-C; unmodified clients connect to it."""
@@ -43,6 +46,7 @@ def controller(
             is_any_host_allowed=allow_any,
             script=text,
             bus=bus,
+            cell=cell,
         )
         server = ControllerServer(setup)
         with server:

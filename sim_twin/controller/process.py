@@ -10,6 +10,7 @@ from typing import Self
 
 import msgspec
 
+from config.errors import ConfigError
 from sim_twin.controller.control_port import CONTROL
 from sim_twin.controller.server import ControllerServer, Setup
 
@@ -94,14 +95,14 @@ class ControllerProcess:
         self.close()
 
     @property
+    def pid(self) -> int | None:
+        """The process's number, None while there is none."""
+        return None if self._process is None else self._process.pid
+
+    @property
     def is_alive(self) -> bool:
         """Whether it runs."""
         return self._process is not None and self._process.is_alive()
-
-    @property
-    def pid(self) -> int | None:
-        """The process's number, None where it does not run."""
-        return None if self._process is None else self._process.pid
 
     def fault(self, name: str, **numbers: object) -> dict[str, object]:
         """Bring a fault about, or ask for the truth; see `faults`.
@@ -133,7 +134,7 @@ def _serve(setup: bytes, line: Connection) -> None:
         server = ControllerServer(msgspec.json.decode(setup, type=Setup))
         with server:
             server.run(when_ready=lambda: line.send_bytes(_READY), is_over=line.poll)
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, ConfigError) as error:
         line.send_bytes(str(error).encode())
     except KeyboardInterrupt:
         pass

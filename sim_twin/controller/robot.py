@@ -6,12 +6,14 @@ from pathlib import Path
 import msgspec
 import numpy as np
 
+from config.cell import CellConfig
 from config.loader import resolve
 from robot.kinematics import Kinematics
+from robot.layout import draw_layout
+from sim_twin.controller.box import Box
 from sim_twin.controller.builtins import program_builtins
 from sim_twin.controller.compiling import Compiler, InlineCompiler, MakeBuiltins
 from sim_twin.controller.hand import Hand
-from sim_twin.controller.io import BOX_BITS
 from sim_twin.controller.machine import Machine
 from sim_twin.controller.motion import SLICE_S, Breach, Measured
 from sim_twin.controller.motion.limits import Cause
@@ -21,7 +23,6 @@ from sim_twin.controller.program import Programs
 from sim_twin.controller.states import Event, RobotMode, RuntimeState
 from sim_twin.controller.watchdogs import WatchdogAction
 from sim_twin.controller.wire import ControllerVersion, ScriptSource
-from sim_twin.layout import draw_layout
 from sim_twin.plant import TwinWorld
 
 __all__ = ["VirtualRobot", "make_world"]
@@ -50,6 +51,7 @@ class VirtualRobot:
         world: The twin; `make_world` makes one.
         version: What the controller announces.
         is_powered: Begin with power on and brakes open.
+        cell: How the table is wired to the control box; straight through where None.
         compiler: Makes programs of texts from builtins; inline, and so deterministic, where absent.
 
     Attributes:
@@ -59,6 +61,7 @@ class VirtualRobot:
         outputs: RTDE's outputs by name.
         panel: wire.DashboardTarget and wire.StateSource.
         disturb: Fault: what becomes of a measurement before anybody sees it.
+        box: The wires between table and terminals.
         forced_inputs: Fault: input bits that are on whatever the table says.
     """
 
@@ -68,6 +71,7 @@ class VirtualRobot:
         *,
         version: ControllerVersion | None = None,
         is_powered: bool = True,
+        cell: CellConfig | None = None,
         compiler: Callable[[MakeBuiltins], Compiler] = InlineCompiler,
     ) -> None:
         self.machine = Machine(world, version=version or ControllerVersion())
@@ -78,6 +82,7 @@ class VirtualRobot:
         self.panel = Panel(self.machine, self.programs)
         self.disturb: Callable[[Measured], Measured] | None = None
         self.forced_inputs = 0
+        self.box = Box(cell)
         self._kinematics = Kinematics(world.arm)
         if is_powered:
             modes.robot = RobotMode.RUNNING
@@ -96,7 +101,7 @@ class VirtualRobot:
         machine.io.apply()
         self._watch()
         self.programs.step()
-        machine.world.digital_out = machine.io.digital_out & BOX_BITS
+        machine.world.digital_out = self.box.drive(machine.io.digital_out)
         breach = drive.tick()
         if self.disturb is not None:
             drive.measured = self.disturb(drive.measured)
@@ -104,7 +109,7 @@ class VirtualRobot:
             self._stop_for(breach)
         self.programs.obey(machine.modes.tick(is_standing=drive.is_standing))
         machine.n_standing = machine.n_standing + 1 if drive.is_standing else 0
-        machine.io.digital_in = machine.world.table.read_inputs() | self.forced_inputs
+        machine.io.digital_in = self.box.sense(machine.world.table.read_inputs()) | self.forced_inputs
         self.hand.tick()
 
     def lay_out(self, *, seed: int, epoch: int, digital_out: int) -> None:
@@ -119,7 +124,7 @@ class VirtualRobot:
         world = machine.world
         layout = draw_layout(world.scenario, np.random.default_rng([seed, epoch]))
         world.put(layout, self._kinematics.solve(layout.start_m, world.arm.home_rad), digital_out)
-        machine.io.digital_out = digital_out & BOX_BITS
+        machine.io.digital_out = self.box.put(digital_out)
         if not drive.is_braked:
             drive.engage()
         self.hand.open()

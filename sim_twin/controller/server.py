@@ -10,6 +10,8 @@ from typing import Self
 
 import msgspec
 
+from config.loader import load_cell
+from config.wiring import check_cell_fits
 from sim_twin.controller.bus_port import BusPort
 from sim_twin.controller.compiling import ThreadCompiler
 from sim_twin.controller.control_port import CONTROL, ControlPort
@@ -41,6 +43,8 @@ class Setup(msgspec.Struct, frozen=True, kw_only=True):
     is_any_host_allowed: bool = False
     script: str = ""
     """Text of a program to run at the start."""
+    cell: str = ""
+    """A shipped cell's name or a path: how the table is wired to the control box; straight through where empty."""
     bus: str = ""
     """Zenoh endpoint to listen on: the twin's truth, and resets of its table."""
     trace: str = ""
@@ -85,7 +89,12 @@ class ControllerServer:
         self.setup = setup
         version = parse_version(setup.version)
         world = make_world(scenario=setup.scenario, seed=setup.seed)
-        self.robot = robot = VirtualRobot(world, version=version, is_powered=setup.is_powered, compiler=ThreadCompiler)
+        cell = load_cell(setup.cell) if setup.cell else None
+        if cell is not None:
+            check_cell_fits(world.scenario, cell, setup.cell)
+        self.robot = robot = VirtualRobot(
+            world, version=version, is_powered=setup.is_powered, cell=cell, compiler=ThreadCompiler
+        )
         self.wires = Wires(
             outputs=robot.outputs,
             inputs=robot.machine,

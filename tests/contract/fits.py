@@ -5,6 +5,9 @@ from perception.percept import Perception
 from robot.clock import LockStepClock
 from robot.hal.fake import FakeArm, FakePlant
 from robot.hal.protocols import Arm, Clock, Plant
+from robot.hal.rtde import RtdeArm
+from robot.hal.rtde_clock import RtdeClock
+from robot.hal.rtde_plant import RtdePlant
 from robot.local_station import LocalStation, Perceives
 from robot.safety import Armable, Operator
 from robot.station import Station
@@ -13,9 +16,9 @@ from sim_twin.plant import TwinArm, TwinPlant
 
 __all__ = ["ARMABLES", "ARMS", "CLOCKS", "OPERATORS", "PERCEIVERS", "PERCEPTIONS", "PLANTS", "STATIONS"]
 
-PLANTS: tuple[type[Plant], ...] = (FakePlant, TwinPlant)
-ARMS: tuple[type[Arm], ...] = (FakeArm, TwinArm)
-CLOCKS: tuple[type[Clock], ...] = (LockStepClock,)
+PLANTS: tuple[type[Plant], ...] = (FakePlant, TwinPlant, RtdePlant)
+ARMS: tuple[type[Arm], ...] = (FakeArm, TwinArm, RtdeArm)
+CLOCKS: tuple[type[Clock], ...] = (LockStepClock, RtdeClock)
 STATIONS: tuple[type[Station], ...] = (LocalStation,)
 ARMABLES: tuple[type[Armable], ...] = (LocalStation,)
 OPERATORS: tuple[type[Operator], ...] = (SimulatedOperator,)

@@ -116,3 +116,16 @@ def test_a_silent_gripper_and_a_closed_connection_are_errors(bench):
 def test_nobody_there_is_said():
     with pytest.raises(WireError, match="URCap"):
         RobotiqGripper(GripScale.of(TOOL)).connect("127.0.4.9", timeout_s=0.2)
+
+
+def test_a_second_connection_begins_anew_whatever_the_first_was_waiting_for(bench):
+    bench.turn(lambda: bench.gripper.state is not None)
+    bench.gripper.poll()
+    bench.gripper.command(grip(0.0))
+    bench.gripper.close()
+    bench.gripper.connect(HOST)
+    assert bench.gripper.state is None
+    bench.turn(lambda: bench.gripper.state is not None)
+    bench.fingers.asked = None
+    bench.gripper.command(grip(0.0))
+    bench.turn(lambda: bench.fingers.asked is not None)

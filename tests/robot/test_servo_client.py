@@ -7,9 +7,13 @@ import time
 import msgspec
 import pytest
 
-from robot.errors import NotEngagedError, RobotConfigError, SafetyError, StaleStateError, WireError
-from robot.messages import GripCommand, Heading, PlantKind
+from perception.ground_truth import GroundTruthPerception
+from robot.errors import NotEngagedError, RobotConfigError, SafetyError, WireError
+from robot.local_station import LocalStation
+from robot.messages import GripCommand, Heading, JointTarget, PlantKind, StationMode
+from robot.rigs import build_plant
 from robot.servo_client import ServoClient
+from robot.servo_process import EXIT_TERMINATED
 from tests.support.stations import fake_rig
 
 OPEN = GripCommand(opening_m=0.085, force_n=20.0, speed_m_s=0.15)
@@ -62,10 +66,15 @@ def test_a_process_that_was_killed_is_said_and_a_new_one_starts_without_command(
     client.engage()
     client.seed()
     os.kill(client.pid, signal.SIGKILL)
-    with pytest.raises(WireError, match="ended"):
-        stride(client, go())
+    came = stride(client, go())
+    assert came.verdict.is_latched
+    assert "ended" in came.verdict.detail
+    assert not came.is_begun
+    assert "ended" in client.why_lost
     with pytest.raises(NotEngagedError, match="connect"):
         client.seed()
+    with pytest.raises(NotEngagedError, match="connect"):
+        stride(client, go())
     client.connect()
     with pytest.raises(SafetyError, match="engage"):
         stride(client, go())
@@ -90,9 +99,11 @@ def test_a_process_that_hangs_is_killed_and_that_is_said(client):
     pid = client.pid
     os.kill(pid, signal.SIGSTOP)
     begun = time.monotonic()
-    with pytest.raises(StaleStateError, match="tick"):
-        stride(client, go())
+    came = stride(client, go())
     assert time.monotonic() - begun < 1.0  # 60 ms on a machine of its own
+    assert came.verdict.is_latched
+    assert "tick" in came.verdict.detail
+    assert "tick" in client.why_lost
     with pytest.raises(ProcessLookupError):
         os.kill(pid, 0)
     client.engage()
@@ -112,8 +123,87 @@ def test_a_process_that_is_busy_out_of_command_is_not_hung(client):
     assert stride(client, go()).verdict is None
 
 
+def test_a_question_that_a_person_broke_in_on_leaves_no_process_behind(client, monkeypatch):
+    client.engage()
+    client.seed()
+    pid = client.pid
+
+    look = client._connection.poll
+
+    def break_in(timeout_s):
+        if timeout_s:  # a question that is waited on
+            raise KeyboardInterrupt
+        return look(timeout_s)
+
+    monkeypatch.setattr(client._connection, "poll", break_in, raising=False)
+    with pytest.raises(KeyboardInterrupt):
+        stride(client, go())
+    client.close()
+    with pytest.raises(ProcessLookupError):
+        os.kill(pid, 0)
+
+
+def test_a_station_whose_servo_process_is_gone_latches_and_a_reset_does_not_take_the_arm_again():
+    resolved = fake_rig()
+    plant = build_plant(rig=resolved.rig, arm=resolved.arm, scenario=resolved.scenario)
+    client = ServoClient(resolved)
+    perception = GroundTruthPerception(scenario=resolved.scenario, arm=resolved.arm)
+    station = LocalStation(
+        world=plant, loop=client, perception=perception, arm=resolved.arm, scenario=resolved.scenario, rig=resolved.rig
+    )
+    with station:
+        station.arm(by="the test")
+        station.engage()
+        os.kill(client.pid, signal.SIGKILL)
+        assert station.step(go()).is_void
+        assert station.state.mode is StationMode.LATCHED
+        with pytest.raises(NotEngagedError):
+            station.reset(seed=0, epoch=0)
+        station.reset_plant(seed=0, epoch=0)
+        station.clear_latch(by="the test")
+        station.engage()
+        os.kill(client.pid, signal.SIGKILL)
+        os.waitid(os.P_PID, client.pid, os.WEXITED | os.WNOWAIT)
+        with pytest.raises(NotEngagedError):
+            station.reset(seed=0, epoch=1)
+        assert station.state.mode is StationMode.LATCHED
+
+
+def test_a_loss_is_told_after_a_stop_too_until_somebody_engages_again(client):
+    client.engage()
+    client.seed()
+    assert client.why_lost is None
+    os.kill(client.pid, signal.SIGKILL)
+    client.stop()
+    client.begin_epoch(0)  # starts a process, without command
+    assert "ended" in client.why_lost
+    client.engage()
+    assert client.why_lost is None
+
+
+def test_a_process_that_is_terminated_stops_its_arm_in_its_time(client):
+    client.engage()
+    client.seed()
+    assert stride(client, go()).verdict is None
+    process = client._process
+    os.kill(client.pid, signal.SIGTERM)
+    process.join(10.0)
+    assert process.exitcode == EXIT_TERMINATED  # not killed by the watch while it stops the arm
+
+
 def test_an_error_of_the_process_is_raised_here_by_its_kind():
     resolved = fake_rig()
     wrong = msgspec.structs.replace(resolved, rig=msgspec.structs.replace(resolved.rig, plant="os:getcwd"))
     with pytest.raises((RobotConfigError, WireError)):
         ServoClient(wrong).connect()
+
+
+@pytest.mark.parametrize("intent", [None, "up", object(), go(distance_m="far"), JointTarget(q_rad=(0.0,) * 5)])
+def test_what_is_no_intent_is_refused_by_the_gate_and_the_process_lives(client, intent):
+    client.engage()
+    client.seed()
+    verdict = stride(client, intent).verdict
+    assert (verdict.reason, verdict.is_latched) == ("malformed", True)
+    client.engage()
+    client.seed()
+    assert stride(client, go()).verdict is None

@@ -8,8 +8,21 @@ import pytest
 
 from robot.errors import ArmRefusedError, StaleStateError, WireError
 from robot.hal.fake import FakePlant
-from robot.messages import GripCommand, Heading
-from robot.servo_messages import Connect, Done, Engage, Reply, Request, Seed, Seeded, StrideReply, StrideRequest
+from robot.messages import ArmMode, GripCommand, Heading
+from robot.servo_client import ServoClient
+from robot.servo_messages import (
+    Close,
+    Connect,
+    Done,
+    Engage,
+    Reply,
+    Request,
+    Seed,
+    Seeded,
+    StrideReply,
+    StrideRequest,
+    pack_intent,
+)
 from robot.servo_process import ServoServer
 from robot.tick_loop import TickLoop
 from tests.support.stations import fake_rig
@@ -91,6 +104,7 @@ def test_an_arm_lost_between_time_steps_is_told_unasked_and_ends_the_process(ser
     assert isinstance(told, StrideReply)
     assert told.stride.verdict.reason == reason
     assert not told.stride.is_begun
+    assert not told.is_asked
     assert served.ended_by == end
     assert served.pulse[0] == 0
 
@@ -99,12 +113,32 @@ def test_an_arm_lost_in_a_time_step_is_told_as_its_end(served):
     grip = GripCommand(opening_m=0.085, force_n=20.0, speed_m_s=0.15)
     intent = Heading(heading_rad=0.0, distance_m=0.01, height_m=0.2)
     served.ours.send_bytes(
-        msgspec.msgpack.encode(StrideRequest(intent=intent, grip=grip, n_ticks=1_000_000, is_hand_busy=False))
+        msgspec.msgpack.encode(
+            StrideRequest(intent=pack_intent(intent), grip=grip, n_ticks=1_000_000, is_hand_busy=False)
+        )
     )
     assert not served.ours.poll(0.05)
     served.fail(StaleStateError("no state"))
     told = served.hear()
     served.thread.join(WAIT_S)
     assert told.stride.is_begun
+    assert told.is_asked
     assert told.stride.verdict.reason == "stale_state"
     assert served.ended_by == "death"
+
+
+def test_a_latch_that_crosses_a_time_step_on_the_way_answers_it_once(served, monkeypatch):
+    client = ServoClient(fake_rig())
+    client._connection = served.ours
+    client.seed()
+    served.plant.arm.mode = ArmMode.PROTECTIVE_STOP
+    assert served.ours.poll(WAIT_S)
+    intent = Heading(heading_rad=0.0, distance_m=0.01, height_m=0.2)
+    grip = GripCommand(opening_m=0.085, force_n=20.0, speed_m_s=0.15)
+    with monkeypatch.context() as crossing:
+        crossing.setattr(client, "_overhear", lambda: None)
+        came = client.stride(intent, grip, n_ticks=1, is_hand_busy=False)
+        assert came.verdict.reason == "arm_mode"
+        served.plant.arm.mode = ArmMode.RUNNING
+        assert client.seed().mode is ArmMode.RUNNING  # and the refusal of the time step is not taken for this answer
+    assert isinstance(served.ask(Close()), Done)

@@ -5,8 +5,8 @@ import pytest
 
 from config.loader import resolve
 from config.resolved import Resolved
+from robot.layout import draw_layout
 from robot.messages import ArmCommand, GripCommand
-from sim_twin.layout import draw_layout
 from sim_twin.names import on_table
 from sim_twin.plant import TwinPlant
 

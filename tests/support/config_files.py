@@ -11,6 +11,7 @@ from config.loader import resolve
 
 FOLDERS = {
     Kind.ARM: "arms",
+    Kind.CELL: "cells",
     Kind.LEARNING: "learning",
     Kind.RIG: "rigs",
     Kind.RULES: "rules",

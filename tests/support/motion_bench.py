@@ -6,11 +6,11 @@ import msgspec
 import numpy as np
 
 from config.loader import resolve
+from robot.layout import draw_layout
 from sim_twin.controller.motion.core import Motion
 from sim_twin.controller.motion.drive import TwinDrive
 from sim_twin.controller.motion.kinematics import ArmKinematics, dh_rows
 from sim_twin.controller.motion.motions import Motions
-from sim_twin.layout import draw_layout
 from sim_twin.plant import TwinWorld
 
 __all__ = ["HOME", "Trace", "make_bench", "make_drive", "play"]

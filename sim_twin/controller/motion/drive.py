@@ -23,7 +23,7 @@ from sim_twin.controller.motion.limits import (
 from sim_twin.controller.motion.motions import Motions
 from sim_twin.controller.motion.poses import Array, pose_from_matrix, vec6
 from sim_twin.controller.motion.setpoint import SLICE_S
-from sim_twin.controller.motion.wrench import GRAVITY_M_S2, NM_PER_A, ContactWrench, payload_bias
+from sim_twin.controller.motion.wrench import GRAVITY_M_S2, NM_PER_A, ContactWrench, is_same_payload, payload_bias
 from sim_twin.controller.states import MotionOrder
 from sim_twin.plant import TwinWorld
 
@@ -323,7 +323,7 @@ class TwinDrive:
         T_bt, J = self.kinematics.forward_and_jacobian(q, self.core.T_ft)
         tool_m = T_bt[:3, 3]
         wrench = self._contacts.at(model, data, tool_m) - self._zero
-        if self._payload is not self._real_payload:
+        if not is_same_payload(self._payload, self._real_payload):
             wrench += payload_bias(self.kinematics.forward(q), tool_m, self._real_payload, self._payload)
         torque = data.qfrc_actuator[:6] + data.qfrc_gravcomp[:6]
         return Measured(

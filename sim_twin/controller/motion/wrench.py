@@ -5,7 +5,7 @@ import numpy as np
 
 from sim_twin.controller.motion.poses import Array
 
-__all__ = ["NM_PER_A", "ContactWrench", "payload_bias"]
+__all__ = ["NM_PER_A", "ContactWrench", "is_same_payload", "payload_bias"]
 
 NM_PER_A = np.array([13.6, 13.6, 13.6, 9.1, 9.1, 9.1])
 """Joint torque over motor current: a torque constant near 0.135 (0.09) Nm/A behind a gear of 101, as published
@@ -39,8 +39,13 @@ class ContactWrench:
             sign = 1.0 if sides[i, 1] else -1.0
             force = sign * (self._force[:3] @ R)
             total[:3] += force
-            total[3:] += sign * (self._force[3:] @ R) + np.cross(data.contact.pos[i] - point_m, force)
+            total[3:] += sign * (self._force[3:] @ R) + _cross(data.contact.pos[i] - point_m, force)
         return total
+
+
+def is_same_payload(one: tuple[float, Array], other: tuple[float, Array]) -> bool:
+    """Return whether two payloads, (kg, centre of gravity), are one: then a sensor has no bias."""
+    return one[0] == other[0] and one[1].tolist() == other[1].tolist()
 
 
 def payload_bias(T_bf: Array, point_m: Array, real: tuple[float, Array], known: tuple[float, Array]) -> Array:
@@ -55,12 +60,24 @@ def payload_bias(T_bf: Array, point_m: Array, real: tuple[float, Array], known: 
     Returns:
         Force and torque, base axes.  (6,)
     """
-    wrench = np.zeros(6)
+    R, from_point_m = T_bf[:3, :3], T_bf[:3, 3] - point_m
+    down_n = about_x_nm = about_y_nm = 0.0
     for sign, (mass, cog) in ((1.0, real), (-1.0, known)):
-        weight = np.array([0.0, 0.0, -sign * mass * GRAVITY_M_S2])
-        wrench[:3] += weight
-        wrench[3:] += np.cross(T_bf[:3, :3] @ cog + T_bf[:3, 3] - point_m, weight)
-    return wrench
+        weight_n = -sign * mass * GRAVITY_M_S2
+        x, y, _ = (R @ cog + from_point_m).tolist()
+        down_n += weight_n
+        about_x_nm += y * weight_n
+        about_y_nm -= x * weight_n
+    return np.array([0.0, 0.0, down_n, about_x_nm, about_y_nm, 0.0])
+
+
+def _cross(a: Array, b: Array) -> Array:
+    """Return a x b.  (3,), (3,) -> (3,)
+
+    NumPy's own takes a hundred microseconds of a slice's two thousand.
+    """
+    (ax, ay, az), (bx, by, bz) = a.tolist(), b.tolist()
+    return np.array([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx])
 
 
 def _hangs_on(model: mujoco.MjModel, body: int, root: int) -> bool:

@@ -15,7 +15,7 @@ REASONS = {
     "all": "stale_state",
     "ticks": "stale_state",
     "joints": "tracking",
-    "servo": "StaleStateError",
+    "servo": "stale_state",
     "program": "arm_refused",
 }
 

@@ -10,6 +10,7 @@ from sim_twin.controller.process import ControllerProcess
 from sim_twin.controller.script.builtins import Sockets
 from sim_twin.controller.script.lexer import tokens_of
 from sim_twin.controller.server import Setup
+from tests.support.loopback import own_address
 from tests.support.virtual_robot import RegisterClient, make_robot
 
 pytest.importorskip("rtde_control", reason="the genuine client comes with `pip install autotelic[lab]`")
@@ -22,7 +23,7 @@ MOVEJ, MOVEL, SPEEDJ, SPEED_STOP, STOP_SCRIPT = 1, 3, 9, 15, 255
 def uploaded():
     from rtde_control import RTDEControlInterface
 
-    with ControllerProcess(Setup(host="127.0.0.8")) as process:
+    with ControllerProcess(Setup(host=own_address())) as process:
         client = RTDEControlInterface(process.host)
         text = process.fault("program")["text"]
         client.disconnect()

@@ -1,0 +1,97 @@
+"""Who presses and looks at a virtual table, over the bus."""
+
+import time
+from collections.abc import Callable
+from types import TracebackType
+from typing import Self
+
+import msgspec
+import zenoh
+
+from robot.bus.session import BusError, open_session
+from robot.bus.topics import CELL, CellAction, CellTruth, topic
+from robot.cell_check import Wire
+
+__all__ = ["VirtualSomebody"]
+
+ANSWER_S, ACT_S, LOOK_S, POLL_S = 5.0, 1.0, 3.0, 0.05
+OPEN_SHARE, SHUT_SHARE = 0.9, 0.05
+
+
+class VirtualSomebody:
+    """Implements robot.cell_check.Somebody with the truth of the twin behind a virtual controller.
+
+    Args:
+        endpoint: Of the bus.
+        serial: Of the virtual controller.
+    """
+
+    def __init__(self, endpoint: str, serial: str) -> None:
+        self._endpoint, self._key = endpoint, topic(serial, CELL)
+        self._session: zenoh.Session | None = None
+
+    def __enter__(self) -> Self:
+        """Join the bus.
+
+        Raises:
+            BusError: nobody listens there.
+        """
+        self._session = open_session(self._endpoint, is_hub=False)
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if self._session is not None:
+            self._session.close()
+
+    def press(self, wire: Wire, is_changed: Callable[[], bool]) -> None:
+        """Press the button, or put a thing into the box."""
+        self._act(wire, is_on=True)
+        _await(is_changed, ACT_S)
+
+    def release(self, wire: Wire, is_back: Callable[[], bool]) -> None:
+        """Let go of it, or take the thing out."""
+        self._act(wire, is_on=False)
+        _await(is_back, ACT_S)
+
+    def ready(self, wire: Wire) -> None:
+        """Nobody has to be asked."""
+
+    def saw(self, wire: Wire, *, is_on: bool) -> bool:
+        """Return whether the lamp or the lid comes to be as asked."""
+        return _await(lambda: self._is(wire, is_on=is_on), LOOK_S)
+
+    def look(self) -> CellTruth:
+        """Return which lamps are lit and how far lids are open."""
+        return self._ask(CellAction())
+
+    def _is(self, wire: Wire, *, is_on: bool) -> bool:
+        seen = self.look()
+        if wire.what == "lamp":
+            return seen.lamps[wire.name] is is_on
+        share = seen.lids[wire.name]
+        return share > OPEN_SHARE if is_on else share < SHUT_SHARE
+
+    def _act(self, wire: Wire, *, is_on: bool) -> None:
+        self._ask(CellAction(name=wire.name, is_on=is_on))
+
+    def _ask(self, action: CellAction) -> CellTruth:
+        assert self._session is not None, "entered"
+        replies = list(self._session.get(self._key, payload=msgspec.json.encode(action), timeout=ANSWER_S))
+        if not replies:
+            raise BusError(f"{self._key}: expected an answer within {ANSWER_S:g} s, none came; does the twin run?")
+        ok, error = replies[0].ok, replies[0].err
+        if ok is None:
+            said = "an error" if error is None else error.payload.to_string()
+            raise BusError(f"{self._key}: {said}")
+        return msgspec.json.decode(ok.payload.to_bytes(), type=CellTruth)
+
+
+def _await(is_there: Callable[[], bool], timeout_s: float) -> bool:
+    end_s = time.monotonic() + timeout_s
+    while not is_there():
+        if time.monotonic() > end_s:
+            return False
+        time.sleep(POLL_S)
+    return True

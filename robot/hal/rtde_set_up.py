@@ -1,0 +1,91 @@
+"""What a control client must bear out before anything moves: the controller's watchdog, the payload, the tool."""
+
+from time import monotonic_ns
+
+from rtde_control import RTDEControlInterface
+from rtde_receive import RTDEReceiveInterface
+
+from config.arm import Tool
+from robot.errors import ArmRefusedError
+from robot.hal.protocols import Clock
+from robot.hal.ur_state import Runtime, UrStatus, is_well, why_refused
+
+__all__ = ["arm_watchdog", "prove_watchdog", "require", "set_tool", "status_of"]
+
+WATCHDOG_HZ = 10.0
+"""Commands that come less often stop the program on the controller's side."""
+PROOF_S = 0.5
+"""Time on the controller's clock in which an armed and starved watchdog must have stopped the program."""
+PROOF_WALL_S = 5.0
+PAYLOAD_TOLERANCE_KG, TCP_TOLERANCE = 0.05, 1e-4
+REASON_TICKS = 5
+
+
+def status_of(receive: RTDEReceiveInterface) -> UrStatus:
+    """Return what the controller said last of its modes."""
+    return UrStatus(
+        robot_mode=receive.getRobotMode(),
+        safety_bits=receive.getSafetyStatusBits(),
+        runtime=int(receive.getRuntimeState()),
+        speed_fraction=receive.getTargetSpeedFraction(),
+    )
+
+
+def require(is_taken: bool, what: str, *, receive: RTDEReceiveInterface, clock: Clock) -> None:
+    """Raise ArmRefusedError with the controller's reason where it did not take something."""
+    if is_taken:
+        return
+    status = status_of(receive)
+    for _ in range(REASON_TICKS):  # the reason may come a moment after the refusal
+        if not is_well(status):
+            break
+        clock.wait_tick()
+        status = status_of(receive)
+    raise ArmRefusedError(f"{what}: the controller did not take it: {why_refused(status)}")
+
+
+def arm_watchdog(control: RTDEControlInterface, receive: RTDEReceiveInterface, clock: Clock) -> None:
+    """Have the controller end the program unless a command comes every 100 ms at least.
+
+    Raises:
+        ArmRefusedError: the controller did not take it.
+    """
+    require(control.setWatchdog(WATCHDOG_HZ), "setWatchdog", receive=receive, clock=clock)
+
+
+def prove_watchdog(control: RTDEControlInterface, receive: RTDEReceiveInterface, clock: Clock) -> None:
+    """Arm the controller's watchdog, starve it, and see the program end. Nothing has moved yet.
+
+    Raises:
+        ArmRefusedError: the program runs on.
+    """
+    arm_watchdog(control, receive, clock)
+    begun_s, deadline_ns = receive.getTimestamp(), monotonic_ns() + round(PROOF_WALL_S * 1e9)
+    while receive.getTimestamp() - begun_s < PROOF_S and monotonic_ns() < deadline_ns:
+        clock.wait_tick()
+        if status_of(receive).runtime == Runtime.STOPPED:
+            return  # the client disconnects as it is dropped
+    control.stopScript()
+    control.disconnect()
+    raise ArmRefusedError(
+        f"expected the controller's watchdog to end a program that is silent for {1e3 / WATCHDOG_HZ:.0f} ms, "
+        f"it ran on for {PROOF_S:g} s: do not move this arm"
+    )
+
+
+def set_tool(control: RTDEControlInterface, receive: RTDEReceiveInterface, clock: Clock, tool: Tool) -> None:
+    """Set payload and tool centre point, and read both back.
+
+    Raises:
+        ArmRefusedError: the controller has others.
+    """
+    tcp = [*tool.tcp_m, 0.0, 0.0, 0.0]
+    require(control.setPayload(tool.mass_kg, list(tool.com_m)), "setPayload", receive=receive, clock=clock)
+    require(control.setTcp(tcp), "setTcp", receive=receive, clock=clock)
+    if any(abs(a - b) > TCP_TOLERANCE for a, b in zip(control.getTCPOffset(), tcp, strict=True)):
+        raise ArmRefusedError(f"expected tool centre point {tcp}, the controller says {control.getTCPOffset()}")
+    deadline_ns = monotonic_ns() + round(PROOF_S * 1e9)
+    while abs(receive.getPayload() - tool.mass_kg) > PAYLOAD_TOLERANCE_KG:
+        if monotonic_ns() > deadline_ns:
+            raise ArmRefusedError(f"expected payload {tool.mass_kg} kg, the controller says {receive.getPayload()}")
+        clock.wait_tick()

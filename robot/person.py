@@ -1,0 +1,79 @@
+"""A person at the terminal: is told things, presses Enter, and arms an arm that nobody else may. The edge."""
+
+import sys
+from typing import Protocol
+
+import typer
+
+from robot.errors import SafetyError
+from robot.messages import StationMode
+from robot.safety.arming import Armable
+
+__all__ = ["Person", "PersonOperator", "TerminalPerson"]
+
+
+class Person(Protocol):
+    """Somebody who can be told and asked."""
+
+    def tell(self, text: str) -> None:
+        """Say something."""
+        ...
+
+    def await_key(self, text: str) -> None:
+        """Say what is to be done and wait for a key. Raises SafetyError where nobody is there any more."""
+        ...
+
+
+class TerminalPerson:
+    """Implements Person on standard error and standard input."""
+
+    def tell(self, text: str) -> None:
+        """Print a line."""
+        typer.echo(text, err=True)
+
+    def await_key(self, text: str) -> None:
+        """Print a line and wait for Enter.
+
+        Raises:
+            SafetyError: the input has ended.
+        """
+        typer.echo(f"{text}; then Enter: ", err=True)
+        if not sys.stdin.readline():
+            raise SafetyError("expected a person's key, the input has ended: nobody is at the arm, it stays disarmed")
+
+
+class PersonOperator:
+    """Implements robot.safety.Operator by asking: on any arm, a real one too."""
+
+    name = "person at the terminal"
+
+    def __init__(self, person: Person | None = None) -> None:
+        self._person = TerminalPerson() if person is None else person
+
+    def arm_once(self, station: Armable) -> None:
+        """Arm and engage a disarmed station when the person says so."""
+        identity = station.identity
+        self._person.await_key(
+            f"the {identity.kind.value} arm {identity.serial} will be taken and may move from now on: stand clear, "
+            "hand on the emergency stop"
+        )
+        station.arm(by=self.name)
+        station.engage()
+
+    def rearm(self, station: Armable, *, seed: int, epoch: int) -> None:
+        """After a latch: let the person look, lay the table out, and clear the latch.
+
+        Raises:
+            SafetyError: the station is not latched, or nobody is there.
+            TooManyLatchesError: the run has latched too often.
+        """
+        state = station.state
+        if state.mode is not StationMode.LATCHED:
+            raise SafetyError(f"expected a latched station, it is {state.mode}: nothing to clear")
+        self._person.await_key(
+            f"the arm was stopped ({state.reason}): find out why, unlock a protective stop at the pendant, lead "
+            "the arm clear of the table by hand"
+        )
+        station.reset_plant(seed=seed, epoch=epoch)
+        station.clear_latch(by=self.name)
+        station.engage()

@@ -1,0 +1,90 @@
+"""A reset that a person does: the arm is let go of, a picture says what belongs where, what is perceived is checked."""
+
+import math
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+
+from config.scenario import Scenario
+from robot.hal.protocols import SceneTruth
+from robot.layout import Layout, draw_layout
+from robot.messages import SceneState
+from robot.person import Person
+
+__all__ = ["PersonResetter", "misplaced"]
+
+TOLERANCE_M = 0.01
+MM = 1e3
+
+
+class _Stops(Protocol):
+    """What a reset needs of the loop."""
+
+    def stop(self) -> None:
+        """Stop the arm and give up command."""
+        ...
+
+
+class PersonResetter:
+    """Implements robot.hal.protocols.Resetter with a person's hands.
+
+    Args:
+        scenario: What is on the table.
+        loop: What holds the arm; it gives up command before anybody reaches in.
+        scene: Where things are perceived to be.
+        person: Who does it.
+        pictures: Folder for the pictures.
+    """
+
+    def __init__(self, *, scenario: Scenario, loop: _Stops, scene: SceneTruth, person: Person, pictures: Path) -> None:
+        self._scenario, self._loop, self._scene = scenario, loop, scene
+        self._person, self._pictures = person, pictures
+
+    def layout_of(self, *, seed: int, epoch: int) -> Layout:
+        """Return the table that a reset draws."""
+        return draw_layout(self._scenario, np.random.default_rng([seed, epoch]))
+
+    def reset(self, *, seed: int, epoch: int, digital_out: int) -> None:
+        """Let the person lay the table out until what is perceived is as drawn.
+
+        Raises:
+            SafetyError: nobody is there any more.
+            StaleStateError: nothing is perceived.
+        """
+        del digital_out  # lamps and lids follow the cell's program as soon as the arm is taken again
+        self._loop.stop()
+        layout = self.layout_of(seed=seed, epoch=epoch)
+        path = self._pictures / f"epoch-{epoch:05d}-seed-{seed}.png"
+        from robot.layout_picture import draw_picture  # brings matplotlib, which only a person needs
+
+        draw_picture(self._scenario, layout, f"epoch {epoch}: where things belong (mm, base frame)", path)
+        request = f"the arm is disarmed; lay the table out for epoch {epoch}, seed {seed}, as in {path}"
+        while True:
+            self._person.await_key(request)
+            off = misplaced(layout, self._scene.read())
+            if not off:
+                break
+            for line in off:
+                self._person.tell(f"not in place: {line}")
+            request = "put right what is not in place"
+        self._person.await_key("everything is in place; take your hands off the table, the arm moves next")
+
+
+def misplaced(layout: Layout, scene: SceneState) -> list[str]:
+    """Return in words what is more than 10 mm from where it was drawn, or not perceived."""
+    places = {thing.name: thing.position_m for thing in scene.objects}
+    wanted = layout.fixtures_m | {name: standing.position_m for name, standing in layout.cylinders.items()}
+    off = []
+    for name, (x, y) in wanted.items():
+        if name not in places:
+            off.append(f"{name}: not perceived")
+            continue
+        away_m = math.dist((x, y), places[name][:2])
+        if not away_m <= TOLERANCE_M:
+            is_x, is_y, _ = places[name]
+            off.append(
+                f"{name}: {away_m * MM:.0f} mm off, belongs at {x * MM:.0f}, {y * MM:.0f}, is at {is_x * MM:.0f}, "
+                f"{is_y * MM:.0f}"
+            )
+    return off

@@ -1,0 +1,88 @@
+"""What the contract suites share: rigs, which cases are worth their wall time, a repeat on a stalled machine."""
+
+import os
+from contextlib import suppress
+from pathlib import Path
+
+import pytest
+from _pytest.runner import runtestprotocol
+
+from tests.support.contract_rigs import WORLDS, open_world
+
+OPENED = pytest.StashKey[object]()
+
+
+@pytest.fixture(scope="module", params=WORLDS)
+def world(request):
+    opened = request.config.stash[OPENED] = open_world(request.param)
+    yield opened
+    opened.close()
+
+
+@pytest.fixture
+def resolved(world):
+    return world.resolved
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items):
+    """Mark slow what `wall_sample` leaves out, on the rigs whose time is the wall's."""
+    n_by_test = {}
+    for item in items:
+        marker = item.get_closest_marker("wall_sample")
+        if marker is None or WORLDS[item.callspec.params["world"]].is_lock_step:
+            continue
+        test = item.originalname, item.path
+        n_by_test[test] = n_by_test.get(test, 0) + 1
+        if n_by_test[test] > marker.args[0]:
+            item.add_marker(pytest.mark.slow)
+
+
+STALL_S, N_ATTEMPTS = 0.03, 3
+REPEATED = pytest.StashKey[list[str]]()
+
+
+def pytest_runtest_protocol(item, nextitem):
+    """Repeat what failed in wall time while the machine had too few processors; elsewhere a failure is one.
+
+    An arm counts as lost after 50 ms without a state, and a program as silent after 100 ms without a command: where the
+    machine's load alone makes such gaps, a failure says nothing of the plant. How long it was is the kernel's count.
+    """
+    name = getattr(getattr(item, "callspec", None), "params", {}).get("world")
+    if name is None or WORLDS[name].is_lock_step:
+        return None
+    item.ihook.pytest_runtest_logstart(nodeid=item.nodeid, location=item.location)
+    for attempt in range(1, N_ATTEMPTS + 1):
+        before_s = _waited_s()
+        reports = runtestprotocol(item, nextitem=nextitem, log=False)
+        waited_s = _waited_s() - before_s
+        if attempt == N_ATTEMPTS or waited_s < STALL_S or not any(report.failed for report in reports):
+            break
+        item.config.stash.setdefault(REPEATED, []).append(
+            f"{item.nodeid} (the machine was overbooked for {waited_s:.3f} s)"
+        )
+        item.config.stash[OPENED].renew()
+        item._initrequest()
+    for report in reports:
+        if attempt > 1:
+            report.sections.append(("stalls", f"attempt {attempt}; the machine was overbooked for {waited_s:.3f} s"))
+        item.ihook.pytest_runtest_logreport(report=report)
+    item.ihook.pytest_runtest_logfinish(nodeid=item.nodeid, location=item.location)
+    return True
+
+
+def pytest_terminal_summary(terminalreporter, config):
+    for told in config.stash.get(REPEATED, []):
+        terminalreporter.write_line(f"repeated on a stalled machine: {told}")
+
+
+def _waited_s():
+    """Return how long somebody on this machine has been ready to run and did not, or its host ran something else."""
+    waited_s = 0.0
+    with suppress(OSError, ValueError, IndexError):
+        steal = Path("/proc/stat").read_text().split("\n", 1)[0].split()[8]
+        waited_s += int(steal) / os.sysconf("SC_CLK_TCK")
+    with suppress(OSError, ValueError, IndexError):
+        some = Path("/proc/pressure/cpu").read_text().split("\n", 1)[0]
+        waited_s += int(some.rsplit("total=", 1)[1]) * 1e-6
+    return waited_s

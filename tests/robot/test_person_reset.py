@@ -1,0 +1,89 @@
+"""A person's reset in lock-step: parked, let go of, checked against the drawing, and on to the drawn start."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from config.loader import resolve
+from perception.ground_truth import GroundTruthPerception
+from robot.errors import NotEngagedError
+from robot.messages import Heading
+from robot.person_reset import PersonResetter, misplaced
+from robot.person_station import PersonResetStation
+from robot.rigs import build_plant
+from robot.tick_loop import TickLoop
+
+SEED, EPOCH = 7, 0
+
+
+class ScriptedPerson:
+    """Does nothing at the first key; at the second lays the table out as the twin's own reset does."""
+
+    def __init__(self, plant, home_rad):
+        self.plant, self.home_rad = plant, np.array(home_rad)
+        self.asked, self.told, self.away_rad = [], [], []
+
+    def tell(self, text):
+        self.told.append(text)
+
+    def await_key(self, text):
+        self.asked.append(text)
+        if len(self.asked) == 1:
+            self.away_rad.append(np.abs(np.array(self.plant.arm.read().q_rad) - self.home_rad).max())
+        if len(self.asked) == 2:
+            self.plant.resetter.reset(seed=SEED, epoch=EPOCH, digital_out=self.plant.arm.read().digital_out)
+
+
+@pytest.fixture
+def lab(tmp_path):
+    resolved = resolve()
+    plant = build_plant(rig=resolved.rig, arm=resolved.arm, scenario=resolved.scenario)
+    loop = TickLoop(
+        arm=plant.arm, config=resolved.arm, scenario=resolved.scenario, rule_sets=resolved.rule_sets, rig=resolved.rig
+    )
+    person = ScriptedPerson(plant, resolved.arm.home_rad)
+    resetter = PersonResetter(
+        scenario=resolved.scenario, loop=loop, scene=plant.truth, person=person, pictures=tmp_path
+    )
+    station = PersonResetStation(
+        world=SimpleNamespace(identity=plant.identity, truth=plant.truth, resetter=resetter), loop=loop,
+        perception=GroundTruthPerception(scenario=resolved.scenario, arm=resolved.arm), arm=resolved.arm,
+        scenario=resolved.scenario, rig=resolved.rig,
+    )  # fmt: skip
+    station.prepare(resetter, resolved.arm.home_rad)
+    with station:
+        yield station, resetter, person, tmp_path
+
+
+def test_a_reset_parks_asks_until_all_is_in_place_and_goes_to_the_drawn_start(lab):
+    station, resetter, person, folder = lab
+    with pytest.raises(NotEngagedError):
+        station.reset(seed=SEED, epoch=EPOCH)
+    assert person.asked == []
+    station.arm(by="the test")
+    station.engage()
+    for _ in range(20):
+        station.step(Heading(heading_rad=-2.0, distance_m=0.02, height_m=0.1))
+    percept = station.reset(seed=SEED, epoch=EPOCH)
+    assert person.away_rad[0] < 0.02
+    assert len(person.asked) == 3
+    assert any("red_cylinder" in line and "mm off" in line for line in person.told)
+    start_m = resetter.layout_of(seed=SEED, epoch=EPOCH).start_m
+    assert np.linalg.norm(np.subtract(percept.tcp_position_m, start_m)) < 0.005
+    (picture,) = folder.glob("*.png")
+    assert picture.read_bytes()[:4] == b"\x89PNG"
+
+
+def test_a_thing_is_in_place_within_ten_millimetres(lab):
+    _, resetter, person, _ = lab
+    layout = resetter.layout_of(seed=SEED, epoch=EPOCH)
+    person.plant.resetter.reset(seed=SEED, epoch=EPOCH, digital_out=0)
+    scene = person.plant.truth.read()
+    assert misplaced(layout, scene) == []
+    for away_m, n_off in ((0.0095, 0), (0.0105, 1)):
+        x, y = layout.fixtures_m["green_button"]
+        shifted = layout.fixtures_m | {"green_button": (x + away_m, y)}
+        moved = type(layout)(fixtures_m=shifted, cylinders=layout.cylinders, start_m=layout.start_m)
+        assert len(misplaced(moved, scene)) == n_off
+    assert misplaced(layout, type(scene)(stamp_ns=0, objects=scene.objects[1:]))[0].endswith("not perceived")
