@@ -90,8 +90,10 @@ class GraphSelector:
         self._changed = tuple(sorted(revised))
 
     def _remember_failure(self, attempt: Attempt) -> None:
+        if attempt.outcome is TrialOutcome.VOID:
+            return
         self._failures = {spot: FRESH * n for spot, n in self._failures.items() if n > FORGOTTEN}
-        if attempt.outcome in (TrialOutcome.BLOCKED, TrialOutcome.NOT_REACHED):
+        if attempt.outcome is not TrialOutcome.ACHIEVED:
             at = (attempt.subgoal, situation_of(attempt))
             counted = 1.0 if self.graph.beliefs[attempt.subgoal].was_achieved else NOVICE
             self._failures[at] = self._failures.get(at, 0.0) + counted
