@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 
 from config.learning import SubgoalSelection
-from learning.controls import Controls, Probe, Spot, probe_of
+from learning.controls import Controls, Probe, Spot, probe_of, violations
 from learning.graph import Finding, Graph
-from learning.preconditions import START, Needs, Situation
+from learning.preconditions import START, Situation
 
 __all__ = ["Curiosity", "most_hopeful_step", "random_walks"]
 
@@ -144,17 +144,11 @@ class Curiosity:
 
     def _retest(self, graph: Graph) -> Probe | None:
         """Return a probe of one believed literal, drawn at random: the goal is tried with only that one violated."""
-        literals = [
-            (g, j)
-            for g in range(graph.n_goals)
-            for j in range(graph.n_goals)
-            if (graph.most_probable(g).on | graph.most_probable(g).off) >> j & 1
-        ]
-        if not literals:
+        violated = [(g, way) for g in range(graph.n_goals) for way in violations(graph.most_probable(g))]
+        if not violated:
             return None
-        goal, violated = literals[int(self._rng.integers(len(literals)))]
-        needs, bit = graph.most_probable(goal), 1 << violated
-        return probe_of(goal, Needs(needs.on ^ bit, needs.off ^ bit), graph)
+        goal, way = violated[int(self._rng.integers(len(violated)))]
+        return probe_of(goal, way, graph)
 
     def _doubts(self, here: Situation, graph: Graph) -> np.ndarray:
         """Return how doubtful each goal not yet achieved is, less the more often it was probed.  () -> (n,)"""

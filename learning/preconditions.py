@@ -179,7 +179,7 @@ class Belief:
         permits = self._provides if evidence.kind is Kind.MISSED else self.allows
         allowed = np.stack([permits(situation) for situation in evidence.readings])  # (readings, h)
         ever_allowed = _ever(allowed, evidence.readings)  # (1 or 2, h)
-        fp, chance = self._false_positive, (self._hits + 1.0) / (self._hits + self._misses + 2.0)  # (), (h,)
+        fp, chance = self._false_positive, self._skills()  # (), (h,)
         match evidence.kind:
             case Kind.ACHIEVED:
                 factors = np.where(ever_allowed, np.maximum(chance, fp), fp).mean(axis=0)
@@ -227,8 +227,11 @@ class Belief:
         """
         if not self.was_achieved:
             return self.predict_allowed(situation)
-        chance = (self._hits + 1.0) / (self._hits + self._misses + 2.0)
-        return float(self.probabilities @ (self.allows(situation) * chance))
+        return float(self.probabilities @ (self.allows(situation) * self._skills()))
+
+    def _skills(self) -> np.ndarray:
+        """Return each conjunction's skill, the mean of Beta(1 + hits, 1 + misses).  () -> (h,)"""
+        return (self._hits + 1.0) / (self._hits + self._misses + 2.0)
 
     @property
     def was_achieved(self) -> bool:
