@@ -23,6 +23,7 @@ from robot.messages import (
     StationSpec,
     StationState,
     StepResult,
+    Vec3,
     Verdict,
 )
 from robot.motion import HandReflexes
@@ -95,7 +96,7 @@ class Loop(Protocol):
         """Start everything from the measured state, and return it."""
         ...
 
-    def stride(self, intent: Intent, grip: GripCommand, *, n_ticks: int, is_hand_busy: bool) -> Stride:
+    def stride(self, intent: Intent, grip: GripCommand, *, n_ticks: int, wait_at_m: Vec3 | None = None) -> Stride:
         """Carry out an intent for so many ticks."""
         ...
 
@@ -229,7 +230,7 @@ class LocalStation:
         duration = self._spec.step_s if duration_s is None else duration_s
         n_ticks = self._whole_ticks(duration)
         grip = self._reflexes.decide(self._percept, _grip_of(intent))
-        stride = self._loop.stride(intent, grip, n_ticks=n_ticks, is_hand_busy=self._reflexes.is_busy)
+        stride = self._loop.stride(intent, grip, n_ticks=n_ticks, wait_at_m=self._reflexes.wait_at_m)
         if stride.verdict is not None:
             self._arming.latch(f"{stride.verdict.reason}: {stride.verdict.detail}")
         return self._result(stride, duration if stride.is_begun else 0.0)

@@ -12,7 +12,7 @@ import msgspec
 from config.resolved import Resolved
 from robot import errors
 from robot.errors import NotEngagedError, RobotError, StaleStateError, WireError
-from robot.messages import ArmState, GripCommand, Intent, Outcome, PlantIdentity, Verdict
+from robot.messages import ArmState, GripCommand, Intent, Outcome, PlantIdentity, Vec3, Verdict
 from robot.safety import Reason
 from robot.servo_messages import (
     BeginEpoch,
@@ -170,7 +170,7 @@ class ServoClient:
         self._newest = self._ask(Seed(), Seeded, ANSWER_S).state
         return self._newest
 
-    def stride(self, intent: Intent, grip: GripCommand, *, n_ticks: int, is_hand_busy: bool) -> Stride:
+    def stride(self, intent: Intent, grip: GripCommand, *, n_ticks: int, wait_at_m: Vec3 | None = None) -> Stride:
         """Carry out an intent for so many ticks. What latched since the last one is told in its place.
 
         A process that hangs or has ended is gone then: the verdict says so.
@@ -178,7 +178,7 @@ class ServoClient:
         Raises:
             NotEngagedError: there was none already, or nobody has seeded it.
         """
-        request = StrideRequest(intent=pack_intent(intent), grip=grip, n_ticks=n_ticks, is_hand_busy=is_hand_busy)
+        request = StrideRequest(intent=pack_intent(intent), grip=grip, n_ticks=n_ticks, wait_at_m=wait_at_m)
         if self._connection is None or self._newest is None:
             raise NotEngagedError("servo process: expected one that holds the arm; connect, engage and seed it")
         self._overhear()

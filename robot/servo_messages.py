@@ -4,7 +4,7 @@ from typing import Any
 
 import msgspec
 
-from robot.messages import ArmState, GripCommand, Intent, PlantIdentity
+from robot.messages import ArmState, GripCommand, Intent, PlantIdentity, Vec3
 from robot.tick_loop import Stride
 
 __all__ = [
@@ -57,7 +57,8 @@ class StrideRequest(_Tagged, frozen=True, kw_only=True):
     """As pack_intent makes it: whatever was asked for crosses, for it is the gate that refuses it."""
     grip: GripCommand
     n_ticks: int
-    is_hand_busy: bool
+    wait_at_m: Vec3 | None = None
+    """Where the tool waits for the hand, base frame; None where it need not wait."""
 
 
 class Stop(_Tagged, frozen=True, kw_only=True):

@@ -183,7 +183,7 @@ class ServoServer:
         self._grip = request.grip
         self._is_beginning = True
         intent = unpack_intent(request.intent)
-        verdict = self._loop.begin(intent, n_ticks=request.n_ticks, is_hand_busy=request.is_hand_busy)
+        verdict = self._loop.begin(intent, n_ticks=request.n_ticks, wait_at_m=request.wait_at_m)
         self._is_beginning = False
         if verdict is None:
             self._n_left = request.n_ticks

@@ -12,14 +12,13 @@ from robot.cell import Cell
 from robot.errors import ArmRefusedError, RobotConfigError, StaleStateError, WireError
 from robot.hal.protocols import Arm
 from robot.kinematics import ToolChain
-from robot.messages import ArmCommand, ArmState, GripCommand, Hold, Intent, Vec3, Verdict
+from robot.messages import ArmCommand, ArmState, GripCommand, Intent, Vec3, Verdict
 from robot.motion import Mover
 from robot.safety import Gate, GateLimits, Reason
 
 __all__ = ["Stride", "TickLoop"]
 
 WHOLE_TICKS = 1e-6
-_HOLD = Hold()
 
 
 class Stride(msgspec.Struct, frozen=True, kw_only=True):
@@ -118,16 +117,16 @@ class TickLoop:
         self._mover.seed(state)
         return state
 
-    def stride(self, intent: Intent, grip: GripCommand, *, n_ticks: int, is_hand_busy: bool) -> Stride:
+    def stride(self, intent: Intent, grip: GripCommand, *, n_ticks: int, wait_at_m: Vec3 | None = None) -> Stride:
         """Carry out an intent for so many ticks.
 
         Args:
             intent: what to do, if the gate admits it.
             grip: what the hand does meanwhile.
             n_ticks: how long.
-            is_hand_busy: the arm waits for the hand.
+            wait_at_m: where in the plane the tool waits for the hand, base frame; None where it need not wait.
         """
-        verdict = self.begin(intent, n_ticks=n_ticks, is_hand_busy=is_hand_busy)
+        verdict = self.begin(intent, n_ticks=n_ticks, wait_at_m=wait_at_m)
         if verdict is not None:
             return self.report(verdict, is_begun=False)
         for _ in range(n_ticks):
@@ -136,18 +135,17 @@ class TickLoop:
                 break
         return self.report(verdict, is_begun=True)
 
-    def begin(self, intent: Intent, *, n_ticks: int, is_hand_busy: bool) -> Verdict | None:
+    def begin(self, intent: Intent, *, n_ticks: int, wait_at_m: Vec3 | None = None) -> Verdict | None:
         """Begin to carry out an intent; ticks do the rest. Returns the gate's refusal, if it refused."""
         before = self._before = self.state
         verdict = self._gate.admit(intent, now_ns=self._arm.clock.now_ns())
         if verdict is not None:
             return verdict
         duration_s = n_ticks * self._tick_s
-        if is_hand_busy:
-            self._mover.begin_step(_HOLD, before, duration_s=duration_s)
-            self._mover.hold("hand")
-        else:
+        if wait_at_m is None:
             self._mover.begin_step(intent, before, duration_s=duration_s)
+        else:
+            self._mover.wait_at(wait_at_m, before)
         return None
 
     def rest(self) -> None:

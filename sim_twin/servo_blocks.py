@@ -146,7 +146,7 @@ class Blocks:
         while (gone_s := perf_counter() - begun_s) < duration_s:
             heading_rad += TURN_RAD
             intent = Heading(heading_rad=heading_rad, distance_m=STEP_M, height_m=HEIGHT_M)
-            stride = self._loop.stride(intent, grip, n_ticks=INTENT_TICKS, is_hand_busy=False)
+            stride = self._loop.stride(intent, grip, n_ticks=INTENT_TICKS)
             if stride.verdict is not None:
                 return False
         self.servo_s += gone_s

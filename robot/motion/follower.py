@@ -78,6 +78,11 @@ class Follower:
         return self._kinematics.chain.tcp_and_lowest(q_rad)
 
     @property
+    def is_upright(self) -> bool:
+        """Whether the tool points down and moves straight."""
+        return self._is_upright
+
+    @property
     def joint_target_rad(self) -> Vec6:
         """Where the joints will rest, as far as it is known before they get there."""
         return self.q_rad if self._is_upright else _vec6(self._joints.target)

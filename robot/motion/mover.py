@@ -64,6 +64,17 @@ class Mover:
         else:
             self._follower.brake()
 
+    def wait_at(self, place_m: Vec3, state: ArmState) -> None:
+        """Come to rest over a place in the plane that the tool has just passed: what the hand closes on lies there.
+
+        A tool that is not upright rests where it can.
+        """
+        self._limiters = ["hand"]
+        self._follower.brake()
+        if self._follower.is_upright:
+            shaped = Shaped((place_m[0], place_m[1], self._follower.target_m[2]))
+            self._follow(shaped, self._follower.yaw_rad, state)
+
     def hold(self, because: str) -> None:
         """Come to rest in place of what an intent asks."""
         self._limiters = [because]

@@ -13,7 +13,8 @@ __all__ = ["HandReflexes"]
 
 ABOVE_M = 0.008
 """The hand closes when the tool centre point is no higher than this above the object's centre."""
-ACROSS_MARGIN_M = 0.001
+ACROSS_MARGIN_M = 0.003
+"""How far inside the pads' edges the object's centre must be: closing stirs it, and past an edge it is squeezed out."""
 IN_HAND_M = 0.035
 """What a full hand holds has its centre this near the tool centre point."""
 CLEAR_M = 0.03
@@ -42,7 +43,8 @@ class HandReflexes:
     """Decides once a step what the hand is asked.
 
     Attributes:
-        is_busy: A reflex has just moved the fingers: the arm waits for them.
+        wait_at_m: Where the tool was, base frame, when a reflex began to move the fingers: it waits there for them.
+            None while they are at rest.
         lost_object: What was held is held no longer although nobody let go.
     """
 
@@ -75,9 +77,9 @@ class HandReflexes:
         self._was_lifted = False
         self._had_object = False
         self._may_close = True
-        self._moved_at_ns: int | None = None
+        self._moved_at_ns = 0
         self._empty_at_ns: int | None = None
-        self.is_busy = False
+        self.wait_at_m: Vec3 | None = None
         self.lost_object = False
         if percept is not None:
             self._places = {thing.name: i for i, thing in enumerate(percept.objects)}
@@ -92,7 +94,7 @@ class HandReflexes:
         self._note(percept)
         if asked is not None:
             self._ask(self._open if asked is Grip.OPEN else self._shut)
-            self.is_busy = False
+            self.wait_at_m = None
             return self._command
         if self._is_waiting(percept):
             return self._command
@@ -120,15 +122,11 @@ class HandReflexes:
 
     def _is_waiting(self, percept: Percept) -> bool:
         """Whether a reflex's movement of the fingers is still going on."""
-        if self._moved_at_ns is None:
-            self.is_busy = False
-        else:
+        if self.wait_at_m is not None:
             waited_ns = percept.stamp_ns - self._moved_at_ns
-            has_begun = waited_ns > 0
-            if has_begun and (not percept.grip.is_moving or waited_ns > PATIENCE_S * 1e9):
-                self._moved_at_ns = None
-            self.is_busy = self._moved_at_ns is not None
-        return self.is_busy
+            if waited_ns > 0 and (not percept.grip.is_moving or waited_ns > PATIENCE_S * 1e9):
+                self.wait_at_m = None
+        return self.wait_at_m is not None
 
     def _decide_open(self, percept: Percept) -> None:
         if not (self._given.close_on_object and self._may_close):
@@ -159,8 +157,7 @@ class HandReflexes:
 
     def _move(self, command: GripCommand, percept: Percept) -> None:
         self._ask(command)
-        self._moved_at_ns = percept.stamp_ns
-        self.is_busy = True
+        self._moved_at_ns, self.wait_at_m = percept.stamp_ns, percept.tcp_position_m
 
     def _ask(self, command: GripCommand) -> None:
         if command is self._open and self._command is self._shut:

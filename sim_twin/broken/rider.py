@@ -81,7 +81,7 @@ class Rider:
         """Move on for a time step; return what came up, if anything did."""
         intent = Twist(linear_m_s=(0.0, self._way * SPEED_M_S, 0.0))
         try:
-            came = self.client.stride(intent, self._grip, n_ticks=STEP_TICKS, is_hand_busy=False)
+            came = self.client.stride(intent, self._grip, n_ticks=STEP_TICKS)
         except RobotError as error:
             return Raised(at_s=monotonic(), what=type(error).__name__, detail=str(error))
         if came.verdict is not None:

@@ -83,6 +83,22 @@ def test_a_hold_stops_short_of_the_target(arm):
     assert arm.tcp == pytest.approx(arm.mover.target_m, abs=1e-5)
 
 
+def test_waiting_for_the_hand_the_tool_comes_back_over_the_place_it_has_passed(arm):
+    for _ in range(6):
+        arm.step(go(distance=0.02, height=0.1))
+    passed = arm.tcp
+    farthest = passed[0]
+    for _ in range(12):
+        arm.mover.wait_at(passed, arm.state)
+        for _ in range(5):
+            arm.q = arm.mover.tick(arm.state)
+            farthest = max(farthest, arm.tcp[0])
+    assert arm.mover.limiters == ("hand",)
+    assert farthest > passed[0] + 0.005
+    assert arm.tcp[:2] == pytest.approx(passed[:2], abs=1e-4)
+    assert passed[2] - 0.06 < arm.tcp[2] < passed[2]
+
+
 def test_the_workspace_and_the_table_stop_the_target(arm):
     for _ in range(30):
         limiters = arm.step(go(angle=0.0))

@@ -72,10 +72,10 @@ def at(dx=0.0, dy=0.0, dz=0.0):
         (at(dz=0.0081), False),
         (at(dz=-0.0224), True),
         (at(dz=-0.0226), False),
-        (at(dx=0.0099), True),
-        (at(dx=0.0101), False),
-        (at(dx=-0.0099), True),
-        (at(dx=-0.0101), False),
+        (at(dx=0.0079), True),
+        (at(dx=0.0081), False),
+        (at(dx=-0.0079), True),
+        (at(dx=-0.0081), False),
         (at(dy=0.0204), True),
         (at(dy=0.0206), False),
         (at(dy=-0.0204), True),
@@ -87,12 +87,12 @@ def test_the_hand_shuts_exactly_while_an_objects_centre_lies_between_the_pads(ha
 
 
 def test_the_arm_waits_while_a_reflex_moves_the_fingers(hand):
-    hand.show(at())
-    assert hand.reflexes.is_busy
-    hand.show(at(), MOVING)
-    assert hand.reflexes.is_busy
-    hand.show(at(), HOLDING)
-    assert not hand.reflexes.is_busy
+    hand.show(at(dx=0.004))
+    assert hand.reflexes.wait_at_m == at(dx=0.004)
+    hand.show(at(dx=0.006), MOVING)
+    assert hand.reflexes.wait_at_m == at(dx=0.004)
+    hand.show(at(dx=0.004), HOLDING)
+    assert hand.reflexes.wait_at_m is None
 
 
 def test_fingers_that_never_rest_do_not_hold_the_arm_for_ever(hand):
@@ -100,14 +100,14 @@ def test_fingers_that_never_rest_do_not_hold_the_arm_for_ever(hand):
     busy = []
     for _ in range(40):
         hand.show(at(), MOVING)
-        busy.append(hand.reflexes.is_busy)
+        busy.append(hand.reflexes.wait_at_m is not None)
     assert busy[0]
     assert not busy[-1]
 
 
 def test_what_the_intent_asks_wins_over_reflexes_and_does_not_hold_the_arm(hand):
     assert hand.show((0.42, 0.0, 0.2), asked=Grip.CLOSE)
-    assert not hand.reflexes.is_busy
+    assert hand.reflexes.wait_at_m is None
     assert not hand.show(at(), asked=Grip.OPEN)
 
 

@@ -25,7 +25,7 @@ def go(**changes):
 
 
 def stride(client, intent):
-    return client.stride(intent, OPEN, n_ticks=N_TICKS, is_hand_busy=False)
+    return client.stride(intent, OPEN, n_ticks=N_TICKS)
 
 
 @pytest.fixture

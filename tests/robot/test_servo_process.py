@@ -113,9 +113,7 @@ def test_an_arm_lost_in_a_time_step_is_told_as_its_end(served):
     grip = GripCommand(opening_m=0.085, force_n=20.0, speed_m_s=0.15)
     intent = Heading(heading_rad=0.0, distance_m=0.01, height_m=0.2)
     served.ours.send_bytes(
-        msgspec.msgpack.encode(
-            StrideRequest(intent=pack_intent(intent), grip=grip, n_ticks=1_000_000, is_hand_busy=False)
-        )
+        msgspec.msgpack.encode(StrideRequest(intent=pack_intent(intent), grip=grip, n_ticks=1_000_000))
     )
     assert not served.ours.poll(0.05)
     served.fail(StaleStateError("no state"))
@@ -137,7 +135,7 @@ def test_a_latch_that_crosses_a_time_step_on_the_way_answers_it_once(served, mon
     grip = GripCommand(opening_m=0.085, force_n=20.0, speed_m_s=0.15)
     with monkeypatch.context() as crossing:
         crossing.setattr(client, "_overhear", lambda: None)
-        came = client.stride(intent, grip, n_ticks=1, is_hand_busy=False)
+        came = client.stride(intent, grip, n_ticks=1)
         assert came.verdict.reason == "arm_mode"
         served.plant.arm.mode = ArmMode.RUNNING
         assert client.seed().mode is ArmMode.RUNNING  # and the refusal of the time step is not taken for this answer
