@@ -18,6 +18,7 @@ from config.rules import RuleSet
 from config.scenario import Scenario
 from config.sources import Source, read_path, read_source
 from config.wiring import check_cell_fits, check_reachable, check_wiring
+from config.workspace import fenced
 from config.yaml_text import parse_yaml
 
 __all__ = [
@@ -97,7 +98,7 @@ def resolve(*, rig: str | Path = "twin", scenario: str | Path = "paper", learnin
     learning_source = read_source("learning", learning)
     resolved = Resolved(
         rig=loaded_rig,
-        arm=_load_arm(arm_source),
+        arm=fenced(_load_arm(arm_source), loaded_scenario, scenario_file),
         scenario=loaded_scenario,
         rule_sets=rule_sets,
         learning=_load_learning(learning_source),
@@ -123,7 +124,7 @@ def with_rig(resolved: Resolved, rig: str | Path) -> Resolved:
     """
     source = read_source("rigs", rig)
     loaded = _load_rig(source)
-    arm = _load_arm(read_source("arms", loaded.arm, base=source.folder))
+    arm = fenced(_load_arm(read_source("arms", loaded.arm, base=source.folder)), resolved.scenario, "scenario")
     if arm != resolved.arm:
         raise ConfigError(source.file, "arm", f"the arm that was used before, {resolved.arm.name}", repr(loaded.arm))
     changed = msgspec.structs.replace(resolved, rig=loaded, cell=_cell_of(loaded, source))

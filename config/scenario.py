@@ -5,7 +5,7 @@ from typing import Annotated
 
 from msgspec import Meta
 
-from config.values import Colour, Length, Mass, Name, Section, Span
+from config.values import Colour, Length, Mass, Name, Point, Section, Span
 
 __all__ = [
     "Box",
@@ -160,6 +160,8 @@ class Scenario(Section, frozen=True, kw_only=True):
     """What d_1..d_n are measured to, in this order; `table` is the table top under the tool."""
     goals: Annotated[tuple[Goal, ...], Meta(min_length=1, max_length=24)]
     schedule: Annotated[tuple[RuleSpan, ...], Meta(min_length=1)]
+    workspace_m: tuple[Point, Point] | None = None
+    """Corners of the box that the tool centre point may be in, base frame, within the arm's own; None is all of it."""
     start: Start = Start()
     reflexes: Reflexes = Reflexes()
     evaluation: Evaluation = Evaluation()

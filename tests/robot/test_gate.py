@@ -156,7 +156,7 @@ def test_a_joint_may_come_to_the_end_of_its_range_and_not_past_it(arm, joint):
 
 @pytest.mark.parametrize(
     ("place", "expected"),
-    [((0.42, -0.366, 0.2), None), ((0.42, -0.375, 0.2), Reason.WORKSPACE), ((0.42, 0.0, 0.0125), Reason.TABLE)],
+    [((0.42, -0.436, 0.2), None), ((0.42, -0.445, 0.2), Reason.WORKSPACE), ((0.42, 0.0, 0.0125), Reason.TABLE)],
 )
 def test_the_tool_may_bow_out_of_the_workspace_by_a_centimetre_and_never_down_to_the_table(gate, place, expected):
     q = Kinematics(ARM).solve(place, ARM.home_rad)

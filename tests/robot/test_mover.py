@@ -188,7 +188,7 @@ def test_however_long_the_tool_is_pushed_the_command_stays_inside_the_fence(arm)
     # Seen on the twin: a held object wedged on a box's wall near the edge of the workspace walked the tool outwards,
     # a millimetre a tick, because the command fell back to the measured joints each time.
     low, high = ARM.motion.workspace_m
-    for _ in range(14):
+    for _ in range(17):
         arm.step(go(angle=-math.pi / 2))
     mover = arm.mover
     pushed = KINEMATICS.tcp(arm.q)
