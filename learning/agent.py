@@ -184,6 +184,8 @@ class Agent:
         while not scene.latched[goal] and len(records) < self._protocol.trials:
             if records and not self._retreat(station, scene):
                 return EpochRecord(epoch=epoch, goal=goal, is_achieved=False, is_void=True, trials=tuple(records))
+            if scene.latched[goal]:  # it came about on the way up
+                break
             record = self._run_trial(station, scene, epoch=epoch, goal=goal, trial=len(records) + 1, explore=explore)
             records.append(record)
             if record.attempt.outcome is TrialOutcome.VOID:

@@ -155,9 +155,9 @@ def explain(
         typer.echo(msgspec.json.encode({"goals": goals, "explanations": explanations}).decode())
     else:
         console = Console()
-        # Goals' names are long: where nobody has set a width, in a pipe, none is cut.
-        width = console.width if console.is_terminal else max(console.width, WIDE)
-        console.print(explanation_table(explanations, goals), width=width)
+        if not console.is_terminal:  # goals' names are long: where nobody has set a width, in a pipe, none is cut
+            console = Console(width=max(console.width, WIDE))
+        console.print(explanation_table(explanations, goals))
 
 
 @_one_line_errors

@@ -1,6 +1,7 @@
 """A run's folder: what was run, with what, and where its figures lie. One process at a time may write to it."""
 
 import fcntl
+import hashlib
 from pathlib import Path
 from types import TracebackType
 from typing import IO, Self
@@ -117,6 +118,19 @@ class RunFolder:
         return read_rows(self.path / "evaluations.csv", EvaluationRow)
 
     # -------------------------------------------------------------------------------------------------------- write
+
+    def refuse_changed_config(self) -> None:
+        """Check that the config is what the run began with: its rows before and after would not be of one run.
+
+        Raises:
+            RunFolderError: the file was changed since.
+        """
+        path = self.path / CONFIG_NAME
+        if hashlib.sha256(path.read_bytes()).hexdigest() != self.manifest().config_sha256:
+            raise RunFolderError(
+                f"{path}: expected the config that the run began with, its digest in {MANIFEST_NAME} is another: undo "
+                "the change, or begin a run of its own in another folder by --out"
+            )
 
     def refuse_unless_empty(self) -> None:
         """Check that a run may start here.

@@ -106,7 +106,8 @@ def open_session(
 
     Raises:
         ConfigError: a config file is missing or wrong.
-        RunFolderError: the folder holds a run that is not to be resumed, or another one, or something else.
+        RunFolderError: the folder holds a run that is not to be resumed, or another one, or something else; or its
+            config is not the one that the run began with.
     """
     if resume and folder.holds_run():
         return _take_up(folder, wanted, stopwatch, consent)
@@ -122,6 +123,7 @@ def _take_up(
     folder: RunFolder, wanted: Wanted, stopwatch: Stopwatch, consent: Callable[[Resolved, int], None]
 ) -> Session:
     then, resolved = folder.manifest(), folder.config()
+    folder.refuse_changed_config()
     refuse_another(wanted, str(folder.path), resolved, then.seed)
     state, passed_over = folder.checkpoints.newest() if folder.checkpoints.exists() else (None, [])
     consent(resolved, 0 if state is None else state["n_done"])

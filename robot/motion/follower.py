@@ -104,6 +104,15 @@ class Follower:
         self._joints.aim(list(q_rad))
         self.target_m = self._kinematics.tcp(q_rad)
 
+    def joints_at(self, place_m: Vec3) -> Vec6 | None:
+        """Return joints near the present ones that bring the tool to a place; None where none do, or it is tilted."""
+        if not self._is_upright:
+            return None
+        try:
+            return self._kinematics.solve(place_m, self.q_rad, yaw_rad=self.yaw_rad)
+        except UnreachableError:
+            return None
+
     def brake(self) -> None:
         """Come to rest as soon as the limits allow."""
         if self._is_upright:

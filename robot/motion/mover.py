@@ -13,6 +13,8 @@ __all__ = ["Mover"]
 
 JOINT_STEP_RAD = 0.35
 """Greatest change of any joint's target in one step."""
+FENCE_MARGIN_M = 1e-4
+"""How far inside a fence a command comes to rest that a push would carry past it."""
 RESEAT_SHARE = 0.9
 """Share of a joint's greatest speed at which commands fall back to the measured joints on contact."""
 
@@ -100,13 +102,29 @@ class Mover:
 
     def _give_way(self, target_m: Vec3, state: ArmState) -> Vec6:
         """Fall back to the measured joints and aim at a target, but never let a push carry the command past a fence."""
-        follower, (low, high) = self._follower, self._limits.workspace_m
+        follower = self._follower
         yaw, back = follower.yaw_rad, self._back_to(state.q_rad)
-        if not inside_box(follower.tcp(back), low, high):
-            back = follower.q_rad
+        if not self._is_inside(back):
+            back = self._back_inside(state.tcp_position_m)
         follower.seed(back)
         follower.aim(fence(target_m, state.tcp_position_m, self._limits).position_m, yaw)
         return back
+
+    def _back_inside(self, measured_m: Vec3) -> Vec6:
+        """Return the command brought back to where the tool is, but for a fence that it was pushed past.
+
+        A command that stayed where it was would go on pressing: at a fence the tool stood on a lid for good.
+        """
+        (x0, y0, z0), (x1, y1, z1) = self._limits.workspace_m
+        (x, y, z), m = measured_m, FENCE_MARGIN_M
+        wanted = self._follower.joints_at(
+            (min(max(x, x0 + m), x1 - m), min(max(y, y0 + m), y1 - m), min(max(z, z0 + m), z1 - m))
+        )
+        back = self._follower.q_rad if wanted is None else self._back_to(wanted)
+        return back if self._is_inside(back) else self._follower.q_rad
+
+    def _is_inside(self, q_rad: Vec6) -> bool:
+        return inside_box(self._follower.tcp(q_rad), *self._limits.workspace_m)
 
     def _follow(self, shaped: Shaped, yaw_rad: float, state: ArmState) -> None:
         self._limiters.extend(shaped.limiters)
@@ -146,7 +164,7 @@ class Mover:
         follower.aim_joints(q)
 
     def _back_to(self, measured_rad: Vec6) -> Vec6:
-        """Return the command brought back to the measured joints as far as one tick allows."""
+        """Return the command brought back to joints, the measured ones, as far as one tick allows."""
         now = self._follower.q_rad
         change = [b - a for a, b in zip(now, measured_rad, strict=True)]
         excess = max(abs(c) / most for c, most in zip(change, self._fall_back_rad, strict=True))

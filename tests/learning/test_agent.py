@@ -1,9 +1,12 @@
 """One epoch, as the paper tells it."""
 
+import math
+
+import msgspec
 import numpy as np
 
 from config.learning import Experiment
-from learning.agent import Agent
+from learning.agent import RISEN_WITHIN_M, Agent
 from learning.checkpoint import encode
 from learning.interfaces import TrialOutcome
 from learning.seeds import named_generator
@@ -58,6 +61,41 @@ class FadingJudge(ToyJudge):
         lit = list(super().achieved(percept))
         lit[1] = lit[1] and percept.distances_m[1] < TOUCH_M
         return tuple(lit)
+
+
+class LiftingStation(ToyStation):
+    """The tool has a height that follows the intents; what is asked of it between trials is recorded."""
+
+    RISE_M = 0.02
+
+    def __init__(self, *, lit_on_the_way_up=None, void_on_the_way_up=False):
+        super().__init__(free)
+        self.height_m = 0.1
+        self.rises = []
+        self._lit_on_the_way_up, self._void_on_the_way_up = lit_on_the_way_up, void_on_the_way_up
+
+    def step(self, intent, *, duration_s=None):
+        change_m = min(max(intent.height_m - self.height_m, -self.RISE_M), self.RISE_M)
+        self.height_m += change_m
+        is_rising = change_m > 0.0
+        if is_rising:
+            self.rises.append(intent)
+        if is_rising and self._lit_on_the_way_up is not None:
+            self._lit[self._lit_on_the_way_up] = True
+        result = super().step(intent, duration_s=duration_s)
+        return msgspec.structs.replace(result, is_void=result.is_void or (is_rising and self._void_on_the_way_up))
+
+    def _percept(self):
+        percept = super()._percept()
+        x, y, _ = percept.tcp_position_m
+        return msgspec.structs.replace(percept, tcp_position_m=(x, y, self.height_m))
+
+
+class Low(ToyExperts):
+    """Moves as its parent does, at the bottom."""
+
+    def act(self, percept):
+        return msgspec.structs.replace(super().act(percept), height_m=0.0)
 
 
 class Idle(ToyExperts):
@@ -179,6 +217,48 @@ def test_a_void_trial_ends_the_epoch_and_teaches_nothing():
     for layer in before:
         before[layer].pop("rng"), after[layer].pop("rng")
     assert encode(before) == encode(after)
+
+
+def pursue(station, subgoals, **protocol):
+    """Pursue goal 2 with experts that work at the bottom; return the agent and the epoch's record."""
+    agent = agent_for(2, subgoals, experts=skilled(Low), **protocol)
+    return agent, agent.learn_epoch(station, epoch=5, seed=3, goal=2)
+
+
+def test_between_trials_the_tool_rises_straight_up_and_no_further_than_it_must():
+    station = LiftingStation()
+    _, record = pursue(station, (0, 1, 2))
+    assert outcomes(record) == [TrialOutcome.ACHIEVED] * 3
+    steps_up = math.ceil((0.1 - RISEN_WITHIN_M) / LiftingStation.RISE_M)
+    assert len(station.rises) == 2 * steps_up
+    assert {(rise.distance_m, rise.height_m) for rise in station.rises} == {(0.0, 0.1)}
+
+
+def test_rising_between_trials_is_no_time_step_of_theirs_and_can_be_left_out():
+    high, low = LiftingStation(), LiftingStation()
+    _, record = pursue(high, (0, 1, 2))
+    _, without = pursue(low, (0, 1, 2), retreat=False)
+    assert low.rises == []
+    assert record.n_steps == without.n_steps
+
+
+def test_a_void_on_the_way_up_makes_the_epoch_void_and_leaves_what_its_trials_taught():
+    agent, record = pursue(LiftingStation(void_on_the_way_up=True), (0, 2))
+    assert (record.is_void, record.is_achieved) == (True, False)
+    assert outcomes(record) == [TrialOutcome.ACHIEVED]
+    assert [attempt.subgoal for attempt in agent.goal_selector.attempts] == [0]
+    assert agent.goal_selector.ended == []
+
+
+def test_a_goal_that_comes_about_on_the_way_up_ends_the_epoch():
+    _, record = pursue(LiftingStation(lit_on_the_way_up=2), (0, 1, 2))
+    assert (record.is_void, record.is_achieved) == (False, True)
+    assert [entry.attempt.subgoal for entry in record.trials] == [0]
+
+
+def test_what_comes_about_on_the_way_up_is_in_the_next_trials_state():
+    _, record = pursue(LiftingStation(lit_on_the_way_up=1), (0, 2))
+    assert record.trials[1].attempt.state == (True, True, False, False)
 
 
 def test_the_goal_selector_hears_of_every_epoch_but_void_ones():

@@ -2,6 +2,7 @@
 
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -91,6 +92,20 @@ def test_resume_begins_a_run_where_there_is_none(folder):
     assert RunFolder(folder / "fresh").manifest().n_epochs == 1
 
 
+def test_resuming_with_a_changed_config_is_refused_and_changes_nothing(run, tmp_path):
+    out = tmp_path / "run"
+    shutil.copytree(run[0], out)
+    config = (out / "config.yaml").read_text()
+    (out / "config.yaml").write_text(config.replace("hazard: 0.01", "hazard: 0.2").replace("epochs: 4", "epochs: 5"))
+    assert (out / "config.yaml").read_text() != config
+    done = learn(out, "--resume")
+    assert done.exit_code == 2
+    assert "config.yaml: expected the config that the run began with" in lines(done)[-1]
+    assert (out / "trials.csv").read_bytes() == (run[0] / "trials.csv").read_bytes()
+    (out / "config.yaml").write_text(config)
+    assert learn(out, "--resume").exit_code == 0
+
+
 def test_resuming_with_another_seed_is_refused(run):
     done = learn("done", "--resume", "--seed", 9)
     assert done.exit_code == 2
@@ -142,6 +157,7 @@ def test_explain_tells_every_goals_needs_and_plan(run):
     table = autotelic("explain", "done")
     assert table.exit_code == 0
     assert "nothing" in table.stdout
+    assert [name for name in told["goals"] if name not in table.stdout] == []  # none is cut
 
 
 def test_explain_of_a_learner_without_a_graph_fails_in_one_line(folder):
@@ -179,19 +195,8 @@ def test_the_bench_reads_the_run_given_or_the_newest(folder, tmp_path):
 
 
 def test_ctrl_c_stops_at_an_epochs_end_and_resuming_gives_the_uninterrupted_run(run, folder):
-    command = [
-        sys.executable,
-        "-m",
-        "learning.main",
-        "learn",
-        "--rig",
-        "fake",
-        "--preset",
-        "fast.yaml",
-        "--workers",
-        "1",
-    ]
-    command = [sys.executable, "-c", "from robot.cli import main; main()", *command[3:]]
+    options = ["--rig", "fake", "--preset", "fast.yaml", "--workers", "1"]
+    command = [sys.executable, "-c", "from robot.cli import main; main()", "learn", *options]
     long = ["--epochs", "24", "--seed", "0"]
     with subprocess.Popen(
         [*command, *long, "--out", "stopped"], cwd=folder, stderr=subprocess.PIPE, text=True

@@ -36,6 +36,12 @@ def percept(*, tool=(0.42, 0.0, 0.2), grip=OPEN, lit=(0, 0, 0), contact=False, *
     )  # fmt: skip
 
 
+def unseen(seen: Percept, name: str) -> Percept:
+    """The same percept with one thing not valid."""
+    objects = tuple(msgspec.structs.replace(o, is_valid=o.is_valid and o.name != name) for o in seen.objects)
+    return msgspec.structs.replace(seen, objects=objects)
+
+
 def test_on_a_fresh_table_no_goal_holds(judge):
     assert judge.achieved(percept()) == (False,) * 6
 
@@ -95,11 +101,74 @@ def test_over_a_box_held_up_with_or_without_the_object_is_at_its_place(judge):
     assert not judge.is_at_place(IN_BOX, percept(tool=(0.54, 0.0, 0.2)))
 
 
+def test_the_thing_in_a_full_hand_is_held_up_to_three_centimetres_off(judge):
+    inside, outside = (0.54, 0.25, 0.058), (0.54, 0.25, 0.062)
+    assert judge.achieved(percept(tool=inside, grip=FULL))[BLUE_GRABBED]
+    assert judge.held(percept(tool=inside, grip=FULL)) == "blue_cylinder"
+    assert not judge.achieved(percept(tool=outside, grip=FULL))[BLUE_GRABBED]
+    assert judge.held(percept(tool=outside, grip=FULL)) is None
+
+
+@pytest.mark.parametrize(("height", "is_in"), [(0.074, True), (0.076, False)])
+def test_a_thing_is_in_a_box_while_its_middle_is_below_the_rim(judge, height, is_in):
+    assert judge.achieved(percept(blue_cylinder=(0.54, 0.0, height)))[IN_BOX] is is_in
+
+
+@pytest.mark.parametrize(("place", "is_in"), [((0.629, 0.089), True), ((0.631, 0.0), False), ((0.54, 0.091), False)])
+def test_a_thing_is_in_a_box_while_its_middle_is_between_the_walls(judge, place, is_in):
+    assert judge.achieved(percept(blue_cylinder=(*place, 0.03)))[IN_BOX] is is_in
+
+
+@pytest.mark.parametrize(("tool_m", "is_at"), [(0.069, False), (0.071, True)])
+def test_a_centimetre_above_a_cylinder_something_else_holds_the_tool_up(judge, tool_m, is_at):
+    assert judge.is_at_place(RED_GRABBED, percept(tool=(0.54, -0.25, tool_m), contact=True)) is is_at
+
+
+@pytest.mark.parametrize(("off_m", "is_at"), [(0.029, True), (0.031, False)])
+def test_a_buttons_place_is_within_the_reach_of_its_middle_and_in_contact(judge, off_m, is_at):
+    over = (0.3 + off_m, 0.0, 0.05)
+    assert judge.is_at_place(GREEN, percept(tool=over, contact=True)) is is_at
+    assert not judge.is_at_place(GREEN, percept(tool=over, contact=False))
+
+
+@pytest.mark.parametrize(("x", "y", "is_at"), [(0.069, 0.069, True), (0.071, 0.0, False), (0.0, -0.071, False)])
+def test_held_up_within_two_centimetres_of_a_wall_is_not_at_the_boxs_place(judge, x, y, is_at):
+    assert judge.is_at_place(IN_BOX, percept(tool=(0.54 + x, y, 0.1), contact=True)) is is_at
+
+
+def test_as_low_as_the_tool_goes_is_within_the_reach_of_its_lowest_height(judge):
+    at = KinematicTable(load_scenario("paper")).spec.heights_m[0] + load_scenario("paper").evaluation.reach_height_m
+    assert judge.is_at_place(IN_BOX, percept(tool=(0.54, 0.0, at - 0.001)))
+    assert not judge.is_at_place(IN_BOX, percept(tool=(0.54, 0.0, at + 0.001)))
+
+
+@pytest.mark.parametrize("name", ["blue_cylinder", "square_box"])
+def test_what_is_in_a_box_is_not_judged_while_either_is_unseen(judge, name):
+    seen = percept(blue_cylinder=(0.54, 0.0, 0.03))
+    assert judge.achieved(seen)[IN_BOX]
+    assert not judge.achieved(unseen(seen, name))[IN_BOX]
+
+
+@pytest.mark.parametrize(
+    ("goal", "name", "tool"),
+    [
+        (RED_GRABBED, "red_cylinder", (0.54, -0.25, 0.093)),
+        (RED_GRABBED, "red_box", (0.48, -0.24, 0.093)),
+        (GREEN, "green_button", (0.3, 0.0, 0.05)),
+        (IN_BOX, "square_box", (0.54, 0.0, 0.1)),
+    ],
+)
+def test_no_place_is_reached_of_a_thing_that_is_unseen(judge, goal, name, tool):
+    there = percept(tool=tool, contact=True)
+    assert judge.is_at_place(goal, there)
+    assert not judge.is_at_place(goal, unseen(there, name))
+
+
 def test_what_is_not_valid_is_not_judged(judge):
     lit = percept(lit=(1, 0, 0))
     blind = msgspec.structs.replace(lit, valid=(False,) * 12)
     assert judge.achieved(lit)[ORANGE]
     assert not judge.achieved(blind)[ORANGE]
-    unseen = tuple(msgspec.structs.replace(o, is_valid=False) for o in lit.objects)
-    at_blue = msgspec.structs.replace(percept(tool=(0.54, 0.25, 0.03), grip=FULL), objects=unseen)
-    assert not judge.achieved(at_blue)[BLUE_GRABBED]
+    at_blue = percept(tool=(0.54, 0.25, 0.03), grip=FULL)
+    assert judge.achieved(at_blue)[BLUE_GRABBED]
+    assert not judge.achieved(unseen(at_blue, "blue_cylinder"))[BLUE_GRABBED]

@@ -200,3 +200,18 @@ def test_however_long_the_tool_is_pushed_the_command_stays_inside_the_fence(arm)
         pushed = (pushed[0], pushed[1] - 0.001, pushed[2])
         arm.q = KINEMATICS.solve(pushed, arm.q)
     assert pushed[1] < low[1] - 0.1
+
+
+@pytest.mark.parametrize("beyond_m", [0.0, 0.0009, 0.003])
+def test_a_command_held_down_at_a_fence_comes_up_to_the_tool(arm, beyond_m):
+    # Seen on the twin: a hand that stood on a lid and was pushed out past a fence by a millimetre never rose again.
+    low, high = ARM.motion.workspace_m
+    commanded = (high[0] - 0.0006, 0.0, 0.0995)
+    arm.q = KINEMATICS.solve(commanded, ARM.home_rad)
+    arm.mover.seed(arm.state)
+    measured = (high[0] + beyond_m, 0.0, 0.1035)
+    state = arm_state(KINEMATICS.solve(measured, arm.q), tcp_m=measured, force_n=(0.0, 0.0, 2 * CONTACT))
+    for _ in range(10):
+        q = arm.mover.tick(state)
+        assert all(a - 1e-6 <= x <= b + 1e-6 for a, x, b in zip(low, KINEMATICS.tcp(q), high, strict=True))
+    assert KINEMATICS.tcp(q)[2] == pytest.approx(measured[2], abs=1e-4)

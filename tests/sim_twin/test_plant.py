@@ -1,5 +1,6 @@
 from pathlib import Path
 
+import mujoco
 import numpy as np
 import pytest
 
@@ -131,6 +132,27 @@ def test_an_untouched_button_reads_off_and_a_pressed_one_on_with_hysteresis(plan
         joint.qpos[0] = share * travel
         seen.append(bool(plant.arm.read().digital_in & bit))
     assert seen == [False, False, True, True, False]
+
+
+@pytest.mark.parametrize(
+    ("off_m", "is_seen"),
+    [
+        ((0.0, 0.0, 0.03), True),
+        ((0.089, 0.0, 0.03), True),
+        ((0.091, 0.0, 0.03), False),
+        ((0.0, -0.089, 0.03), True),
+        ((0.0, -0.091, 0.03), False),
+        ((0.0, 0.0, 0.074), True),
+        ((0.0, 0.0, 0.076), False),
+    ],
+)
+def test_a_boxs_sensor_sees_what_is_between_its_walls_and_below_its_rim(plant, resolved, off_m, is_seen):
+    plant.resetter.reset(seed=4, epoch=0, digital_out=LIDS)
+    box, world = resolved.scenario.boxes[1], plant.world
+    assert not plant.arm.read().digital_in & 1 << box.presence_input
+    world.data.joint(on_table("red_cylinder")).qpos[:3] = np.add(poses(plant)[box.name], off_m)
+    mujoco.mj_kinematics(world.model, world.data)
+    assert bool(plant.arm.read().digital_in & 1 << box.presence_input) is is_seen
 
 
 def test_a_stop_comes_to_rest_and_keeps_the_grip(plant):
