@@ -141,6 +141,8 @@ class EraSummary(msgspec.Struct, frozen=True, kw_only=True):
     """First of two evaluations running at which every goal is mastered: learnt, or recovered."""
     graph_right_after: int | None
     """First look, every ten epochs, at which the learnt graph is right for every goal in every reachable state."""
+    graph_wrong_later: float | None
+    """Share of the looks after that one at which it was wrong again; None without such looks."""
     success_by_goal: tuple[float | None, ...]
     """Share of successes over the era's last 200 epochs' evaluations."""
     trials_by_goal: tuple[float | None, ...]
@@ -208,6 +210,8 @@ def _summarise_era(
         by_epoch.setdefault(row.epoch, []).append(row)
     mastered = [(epoch, all(map(is_mastered, of_epoch))) for epoch, of_epoch in sorted(by_epoch.items())]
     right = [(row.epoch, row.n_wrong == 0) for row in graph_rows]
+    right_at = first_running(right, running=1)
+    later = [not is_right for epoch, is_right in right if right_at is not None and epoch > right_at]
     settled_from = max(era.from_epoch, era.until_epoch - SETTLED_EPOCHS)
     settled = [[row for row in rows if row.goal == goal and row.epoch > settled_from] for goal in range(len(optima))]
     trials = tuple(_ratio(_total(of_goal, "trials_achieved"), _total(of_goal, "n_successes")) for of_goal in settled)
@@ -216,7 +220,8 @@ def _summarise_era(
         from_epoch=era.from_epoch,
         until_epoch=era.until_epoch,
         learnt_after=_since(era, first_running(mastered, running=2)),
-        graph_right_after=_since(era, first_running(right, running=1)),
+        graph_right_after=_since(era, right_at),
+        graph_wrong_later=fmean(later) if later else None,
         success_by_goal=tuple(_ratio(_total(of_goal, "n_successes"), _total(of_goal, "n_all")) for of_goal in settled),
         trials_by_goal=trials,
         optimal_by_goal=tuple(optima),

@@ -70,6 +70,8 @@ class EraReport(msgspec.Struct, frozen=True, kw_only=True):
     learnt_after: Spread | None
     graph_right: Count
     graph_right_after: Spread | None
+    graph_wrong_later: Spread | None
+    """Share of the looks after that at which it was wrong again."""
     trials_over_optimum: Spread | None
     trials_over_optimum_with_failures: Spread | None
     success: Spread | None
@@ -161,6 +163,7 @@ def _report_era(parts: Sequence[EraSummary]) -> EraReport:
         learnt_after=_spread(parts, lambda part: part.learnt_after),
         graph_right=count(sum(part.graph_right_after is not None for part in parts), len(parts)),
         graph_right_after=_spread(parts, lambda part: part.graph_right_after),
+        graph_wrong_later=_spread(parts, lambda part: part.graph_wrong_later),
         trials_over_optimum=_spread(parts, lambda part: part.trials_over_optimum),
         trials_over_optimum_with_failures=_spread(parts, lambda part: part.trials_over_optimum_with_failures),
         success=_spread(parts, lambda part: min((s for s in part.success_by_goal if s is not None), default=None)),

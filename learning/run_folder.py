@@ -62,6 +62,7 @@ class RunFolder:
         self.path = path
         self.checkpoints = CheckpointStore(path / "checkpoints")
         self._lock: IO[str] | None = None
+        self._is_made_here = False
 
     # --------------------------------------------------------------------------------------------------------- read
 
@@ -166,6 +167,7 @@ class RunFolder:
         Raises:
             RunFolderError: another process has it, or it cannot be made.
         """
+        self._is_made_here = not self.path.exists()
         try:
             self.path.mkdir(parents=True, exist_ok=True)
             self._lock = (self.path / "lock").open("w")
@@ -181,9 +183,13 @@ class RunFolder:
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
-        if self._lock is not None:
-            self._lock.close()
-            self._lock = None
+        if self._lock is None:
+            return
+        if self._is_made_here and [entry.name for entry in self.path.iterdir()] == ["lock"]:
+            (self.path / "lock").unlink()
+            self.path.rmdir()
+        self._lock.close()
+        self._lock = None
 
 
 def run_folders(path: Path) -> list[RunFolder]:

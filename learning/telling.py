@@ -31,6 +31,8 @@ def _era_line(era: EraSummary, *, is_first: bool) -> str:
     word = "learnt" if is_first else f"rules changed at epoch {era.from_epoch}: recovered"
     after = "not yet" if era.learnt_after is None else f"after {era.learnt_after} epochs"
     graph = "" if era.graph_right_after is None else f", graph right after {era.graph_right_after}"
+    if era.graph_wrong_later:
+        graph += f" (wrong again at {era.graph_wrong_later:.0%} of later looks)"
     shares = [share for share in era.success_by_goal if share is not None]
     success = f", least success at the end {min(shares):.0%}" if shares else ""
     excess = era.trials_over_optimum

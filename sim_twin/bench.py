@@ -159,8 +159,9 @@ def bench_twin(*, full: bool) -> BenchReport:
 
 
 class _Pick(msgspec.Struct, frozen=True):
-    """One pick: was it held to the end, how far did it slip, and was a drop seen."""
+    """One pick: was it ever held, was it held to the end, how far did it slip, and was a drop seen."""
 
+    was_held: bool
     is_held: bool
     slip_m: float
     is_reported_held: bool
@@ -176,9 +177,9 @@ def bench_grasp(*, full: bool) -> BenchReport:
     held = [p for p in firm if p.is_held]
     hold_rate = len(held) / len(firm)
     slip_mm = 1e3 * float(np.percentile([p.slip_m for p in held], 95)) if held else math.inf
-    dropped = [p for p in (*firm, *slippery) if not p.is_held]
+    dropped = [p for p in (*firm, *slippery) if p.was_held and not p.is_held]
     seen = sum(not p.is_reported_held for p in dropped) / len(dropped) if dropped else 1.0
-    drop_rate = sum(not p.is_held for p in slippery) / len(slippery)
+    drop_rate = sum(p.was_held and not p.is_held for p in slippery) / len(slippery)
     results = (
         BenchResult(
             name="hold_rate", value=hold_rate, unit="share", goal=f">= {HOLD_GOAL:g}", ok=hold_rate >= HOLD_GOAL
@@ -218,7 +219,7 @@ def _pick(pilot: Pilot, plant: TwinPlant, name: str, *, side: int) -> _Pick:
     x, y, _ = pilot.where(name)
     pilot.go(x, y)
     pilot.rest()
-    pilot.down(lambda r: r.percept.grip.has_object)
+    was_held = pilot.down(lambda r: r.percept.grip.has_object)
     pilot.rest(4)
     start = _in_hand(plant, name)
     for _ in range(14):
@@ -231,7 +232,7 @@ def _pick(pilot: Pilot, plant: TwinPlant, name: str, *, side: int) -> _Pick:
         plant.arm.clock.wait_tick()
     end = _in_hand(plant, name)
     is_held = bool(np.linalg.norm(end) < HELD_WITHIN_M)
-    return _Pick(is_held, float(np.linalg.norm(end - start)), plant.arm.read().grip.has_object)
+    return _Pick(was_held, is_held, float(np.linalg.norm(end - start)), plant.arm.read().grip.has_object)
 
 
 HELD_WITHIN_M = 0.03

@@ -9,10 +9,14 @@ import pytest
 import yaml
 
 from config.errors import ConfigError
-from config.kinds import LOADERS, kind_of
+from config.kinds import LOADERS, Kind, kind_of
+from config.loader import resolve
+from config.resolved import Resolved
 from tests.support.config_files import shipped_files
 
 N_FILES = 1000
+WHOLE = {Kind.SCENARIO: "scenario", Kind.RIG: "rig", Kind.LEARNING: "learning"}
+"""Kinds of file that a whole run can be resolved from beside shipped ones."""
 EXTREMES = [
     None, True, False, 0, -1, 1, 16, 99, 2**31, 2**63, 10**30, 1e-300, 1e300, float("nan"), float("inf"), -float("inf"), -0.0,
     "", " ", "on", "nan", "table", "gripper", "../../x.yaml", "paper", "\n", "\x1b[2J", "é", "a" * 5000, [], {}, [[]], [None], {"x": 1},
@@ -120,13 +124,21 @@ def spoil(text, rng):
     return BYTE_MUTATIONS[rng.integers(len(BYTE_MUTATIONS))](content, rng)
 
 
+def resolved_with(part, path):
+    """Return what a file that loads makes together with the shipped ones, or why it does not go with them."""
+    try:
+        return resolve(**{part: path})
+    except ConfigError as refusal:
+        return refusal
+
+
 @pytest.mark.parametrize("seed", range(4))
 def test_hostile_files_give_a_config_error_or_a_valid_config(tmp_path, monkeypatch, seed):
     monkeypatch.chdir(tmp_path)
     rng = np.random.default_rng(seed)
     files = shipped_files()
     path = tmp_path / "hostile.yaml"
-    refusals = []
+    refusals, wholes = [], []
     for i in range(N_FILES // 4):
         kind, text = files[i % len(files)]
         path.write_bytes(spoil(text, rng))
@@ -135,7 +147,11 @@ def test_hostile_files_give_a_config_error_or_a_valid_config(tmp_path, monkeypat
                 load(path)
             except ConfigError as refusal:
                 refusals.append((load, refusal))
+            else:
+                wholes += [resolved_with(WHOLE[kind], path)] if kind in WHOLE else []
     assert [str(refusal) for _, refusal in refusals if not str(refusal).isprintable()] == []
     assert [str(refusal) for _, refusal in refusals if not refusal.expected or not refusal.got] == []
     share = sum(load is not kind_of for load, _ in refusals) / (N_FILES // 4)
     assert 0.5 < share < 0.98  # the mutations break most files, not all
+    assert [str(whole) for whole in wholes if isinstance(whole, ConfigError) and not str(whole).isprintable()] == []
+    assert any(isinstance(whole, Resolved) for whole in wholes)

@@ -130,6 +130,14 @@ def test_void_epochs_teach_nothing_and_too_many_running_fail_the_run(tmp_path):
         many.go()
 
 
+def test_void_epochs_running_are_counted_across_a_stop(tmp_path):
+    void = tuple(range(105, 120))
+    assert ToyRun(tmp_path, PROTOCOL, seed=5, void_epochs=void).go(stop_at=110) == 110
+    resumed = ToyRun(tmp_path, PROTOCOL, seed=5, void_epochs=void, resume=True)
+    with pytest.raises(TooManyVoidEpochsError, match="the last one epoch 114"):
+        resumed.go()
+
+
 def test_the_files_of_a_run_are_its_tables_and_checkpoints(whole):
     assert set(files_of(whole)) == set(FILES)
     names = sorted(path.name for path in (whole / "checkpoints").iterdir())

@@ -137,6 +137,7 @@ def test_a_summary_worked_by_hand():
     assert summary.time_steps_to_all is None
     assert (first.learnt_after, first.graph_right_after) == (None, 50)
     assert (second.learnt_after, second.graph_right_after) == (50, 30)
+    assert (first.graph_wrong_later, second.graph_wrong_later) == (0.5, 0.0)
     assert second.success_by_goal == (38 / 40, 1.0)
     assert second.trials_by_goal == (1.0, 2.5)
     assert second.trials_over_optimum == pytest.approx((0.0 + 0.5) / 2)

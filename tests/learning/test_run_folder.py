@@ -54,6 +54,16 @@ def test_a_folder_in_use_is_refused_and_free_again_afterwards(tmp_path):
         pass
 
 
+def test_a_folder_that_was_made_for_nothing_is_taken_away_again(tmp_path):
+    with RunFolder(tmp_path / "new"):
+        pass
+    assert not (tmp_path / "new").exists()
+    (tmp_path / "there").mkdir()
+    with RunFolder(tmp_path / "there"):
+        pass
+    assert (tmp_path / "there").exists()
+
+
 def test_a_folder_that_cannot_be_made_is_refused(tmp_path):
     (tmp_path / "file").write_text("")
     with pytest.raises(RunFolderError, match="expected a folder that can be written to"):
