@@ -28,7 +28,6 @@ if TYPE_CHECKING:
 __all__ = ["evaluate", "explain", "learn", "report"]
 
 EXIT_FAILED, EXIT_USAGE, EXIT_INTERRUPTED = 1, 2, 130
-WIDE = 180
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -154,10 +153,7 @@ def explain(
     if json:
         typer.echo(msgspec.json.encode({"goals": goals, "explanations": explanations}).decode())
     else:
-        console = Console()
-        if not console.is_terminal:  # goals' names are long: where nobody has set a width, in a pipe, none is cut
-            console = Console(width=max(console.width, WIDE))
-        console.print(explanation_table(explanations, goals))
+        Console().print(explanation_table(explanations, goals))
 
 
 @_one_line_errors

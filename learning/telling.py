@@ -70,9 +70,10 @@ def score_table(rows: Sequence[EvaluationRow], goals: Sequence[str]) -> Table:
 
 
 def explanation_table(explanations: Sequence[Explanation], goals: Sequence[str]) -> Table:
-    """Return a table of what is believed of each goal."""
-    columns = ("goal", "needs", "sure", "for / against", "changed at epoch", "skill", "plan from a fresh table")
-    table = Table(*columns, show_lines=True)
+    """Return a table of what is believed of each goal: narrow enough for 80 columns, and no name is cut."""
+    table = Table(show_lines=True)
+    for heading in ("goal", "needs, and the plan from a fresh table", "on what evidence"):
+        table.add_column(heading, overflow="fold")
     for told in explanations:
         needs = [goals[i] for i in told.needs_on] + [f"not {goals[i]}" for i in told.needs_off]
         doubts = [
@@ -82,14 +83,19 @@ def explanation_table(explanations: Sequence[Explanation], goals: Sequence[str])
         ]
         table.add_row(
             goals[told.goal],
-            "\n".join([*(needs or ["nothing"]), *(f"[dim]perhaps {doubt}[/dim]" for doubt in doubts)]),
-            f"{told.probability:.0%}",
-            f"{told.n_for} / {told.n_against}",
-            "never" if told.changed_epoch is None else str(told.changed_epoch),
-            f"{told.skill:.0%}",
-            " → ".join(goals[i] for i in told.plan) if told.plan else "none known",
+            "\n".join(
+                [*(needs or ["nothing"]), *(f"[dim]perhaps {doubt}[/dim]" for doubt in doubts), _plan(told, goals)]
+            ),
+            f"{told.probability:.0%} sure\n{told.n_for} for, {told.n_against} against\n"
+            + ("never changed" if told.changed_epoch is None else f"changed at epoch {told.changed_epoch}")
+            + f"\nskill {told.skill:.0%}",
         )
     return table
+
+
+def _plan(told: Explanation, goals: Sequence[str]) -> str:
+    """Return the plan, a line an arrow, so that a narrow column breaks between names only."""
+    return "\n → ".join(["plan", *(goals[i] for i in told.plan)]) if told.plan else "no plan known"
 
 
 def profile_of(ended: Ended) -> dict[str, object]:
