@@ -1,8 +1,9 @@
 """The process that holds an arm: motion, gate and client, and nothing else. It ticks as long as it is in command.
 
 Between intents the arm goes on to where the last one led, until that is older than an intent may be; then it is brought
-to rest and held there. So the time that a station takes to answer bends no path, and the controller's watchdog is fed by
-commands that passed the gate, and by nothing else. When the pipe to its station closes it stops the arm and ends. After a loss of the arm it ends too,
+to rest and held there. Time steps that follow one another begin on a grid: what the station took to decide is part of the
+step that it decided on. So its own time bends no path, and the controller's watchdog is fed by commands that passed the
+gate, and by nothing else. When the pipe to its station closes it stops the arm and ends. After a loss of the arm it ends too,
 at once where nothing is known of the arm any more: the client library must never get the chance to reconnect and go on
 by itself. What latched is told before the arm is stopped, for a stop takes its time. Ctrl-C at the terminal is the
 station's to decide on: this process is in a group of its own, so that it does not vanish from under an epoch that is
@@ -130,7 +131,7 @@ class ServoServer:
         self._encode = msgspec.msgpack.Encoder().encode
         self._is_in_command = self._is_over = self._is_beginning = False
         self._grip: GripCommand | None = None
-        self._n_left = self._n_ticks = self._intent_ns = 0
+        self._n_left = self._n_over = self._n_ticks = self._intent_ns = 0
         self._is_resting = True
 
     def run(self) -> None:
@@ -164,9 +165,12 @@ class ServoServer:
         if self._n_left:
             self._n_left -= 1
             if not self._n_left:
+                self._n_over = 0
                 self._send(StrideReply(stride=self._loop.report(None, is_begun=True)))
-        elif not self._is_resting and self._now_ns() - self._intent_ns >= self._intent_max_age_ns:
-            self._rest()
+        elif not self._is_resting:
+            self._n_over += 1
+            if self._now_ns() - self._intent_ns >= self._intent_max_age_ns:
+                self._rest()
 
     def _answer(self, request: Request) -> None:
         if isinstance(request, StrideRequest):
@@ -188,7 +192,8 @@ class ServoServer:
         verdict = self._loop.begin(request.intent, n_ticks=request.n_ticks, is_hand_busy=request.is_hand_busy)
         self._is_beginning = False
         if verdict is None:
-            self._n_left = request.n_ticks
+            n_over = 0 if self._is_resting else self._n_over
+            self._n_left = max(request.n_ticks - n_over, (request.n_ticks + 1) // 2)
             self._intent_ns, self._is_resting = self._now_ns(), False
 
     def _obey(self, request: Request) -> Reply:

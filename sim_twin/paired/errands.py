@@ -1,37 +1,43 @@
 """Seeded errands over a drawn table, driven once by a pilot so that their intents can be sent again."""
 
 import math
+from collections.abc import Iterator
+from enum import StrEnum
+from itertools import islice
 
 import msgspec
 import numpy as np
 
-from robot.messages import Heading, Intent, Percept, StationSpec, StepResult
+from robot.messages import Heading, Intent, Percept, StationSpec, StationState, StepResult
 from robot.station import Station
 from sim_twin.pilot import Pilot
 
-__all__ = ["Errand", "Pace", "drive_errand"]
+__all__ = ["Errand", "Kind", "drive_errand"]
 
-CLEAR_M = 0.15
-"""Of everything on the table when the tool goes down beside it."""
 INSIDE_M = 0.02
 DESCENT_M = 0.06
-N_TRIES = 200
+N_PLACES, NEAR_M, FAR_M = 3, 0.1, 0.25
+N_DRAWN = 200
+REST_STEPS = 4
+RISE_STEPS = 12
+Planar = tuple[float, float]
 
 
-class Pace(msgspec.Struct, frozen=True, kw_only=True):
-    """How much there is to an errand."""
+class Kind(StrEnum):
+    """What an errand consists of."""
 
-    n_points: int = 3
-    """Places at travel height that the tool goes to."""
-    has_descent: bool = True
-    """It goes down over free table and up again."""
-    has_press: bool = True
-    """It presses a button."""
+    MOVES = "moves"
+    """A few places at travel height, one after the other without a rest."""
+    DESCENT = "descent"
+    """Down over free table, and up again."""
+    PRESS = "press"
+    """Down on a button until it holds the tool up, and up again."""
 
 
 class Errand(msgspec.Struct, frozen=True, kw_only=True):
     """Intents, one a time step, and the reset before them."""
 
+    kind: Kind
     seed: int
     epoch: int
     intents: tuple[Heading, ...]
@@ -49,7 +55,7 @@ class _Noting:
         return self._station.spec
 
     @property
-    def state(self):  # noqa: ANN202 - the station's own
+    def state(self) -> StationState:
         return self._station.state
 
     def reset(self, *, seed: int, epoch: int) -> Percept:
@@ -64,54 +70,59 @@ class _Noting:
         self._station.close()
 
 
-def drive_errand(station: Station, *, seed: int, epoch: int, pace: Pace) -> Errand:
+def drive_errand(station: Station, *, kind: Kind, seed: int, epoch: int) -> Errand:
     """Drive a station over a freshly drawn table and return what was asked of it.
 
     Args:
         station: Engaged.
+        kind: What to do.
         seed: Of the table and of the errand.
         epoch: Whose rules are in force.
-        pace: How much there is to it.
     """
     noting = _Noting(station)
     pilot = Pilot(noting)
     percept = pilot.reset(seed=seed, epoch=epoch)
     rng = np.random.default_rng([seed, epoch])
-    for _ in range(pace.n_points):
-        pilot.go(*_somewhere(station.spec, rng))
-    if pace.has_descent:
-        pilot.go(*_beside_everything(percept, station.spec, rng))
-        pilot.rest(3)
-        for _ in range(round(DESCENT_M / station.spec.max_step_m) + 1):
-            pilot.step(height_m=pilot.travel_m - DESCENT_M)
-        _rise(pilot)
-    if pace.has_press:
-        names = [o.name for o in percept.objects][: station.spec.n_buttons]
-        at = pilot.where(names[int(rng.integers(len(names)))])
-        pilot.go(at[0], at[1])
-        pilot.rest(3)
-        pilot.down(lambda result: result.percept.is_in_contact)
-        _rise(pilot)
-    pilot.rest(4)
-    return Errand(seed=seed, epoch=epoch, intents=tuple(noting.intents))
+    _DRIVES[kind](pilot, percept, station.spec, rng)
+    pilot.rest(REST_STEPS)
+    return Errand(kind=kind, seed=seed, epoch=epoch, intents=tuple(noting.intents))
+
+
+def _move(pilot: Pilot, percept: Percept, spec: StationSpec, rng: np.random.Generator) -> None:
+    here: Planar = percept.tcp_position_m[:2]
+    for _ in range(N_PLACES):
+        here = next(p for p in _places(spec, rng) if NEAR_M < math.dist(p, here) < FAR_M)
+        pilot.go(*here)
+
+
+def _descend(pilot: Pilot, percept: Percept, spec: StationSpec, rng: np.random.Generator) -> None:
+    drawn = list(islice(_places(spec, rng), N_DRAWN))
+    pilot.go(*max(drawn, key=lambda p: min(math.dist(p, o.position_m[:2]) for o in percept.objects)))
+    for _ in range(math.ceil(DESCENT_M / spec.max_step_m)):
+        pilot.step(height_m=pilot.travel_m - DESCENT_M)
+    _rise(pilot)
+
+
+def _press(pilot: Pilot, percept: Percept, spec: StationSpec, rng: np.random.Generator) -> None:
+    name = percept.objects[int(rng.integers(spec.n_buttons))].name
+    x, y, _ = pilot.where(name)
+    pilot.go(x, y)
+    pilot.rest(REST_STEPS)
+    pilot.down(lambda result: result.percept.is_in_contact)
+    _rise(pilot)
+
+
+_DRIVES = {Kind.MOVES: _move, Kind.DESCENT: _descend, Kind.PRESS: _press}
 
 
 def _rise(pilot: Pilot) -> None:
-    for _ in range(12):
+    for _ in range(RISE_STEPS):
         pilot.step()
 
 
-def _somewhere(spec: StationSpec, rng: np.random.Generator) -> tuple[float, float]:
+def _places(spec: StationSpec, rng: np.random.Generator) -> Iterator[Planar]:
+    """Draw places over the table."""
     low, high = spec.workspace_m
-    x, y = rng.uniform([low[0] + INSIDE_M, low[1] + INSIDE_M], [high[0] - INSIDE_M, high[1] - INSIDE_M])
-    return float(x), float(y)
-
-
-def _beside_everything(percept: Percept, spec: StationSpec, rng: np.random.Generator) -> tuple[float, float]:
-    """Return a place that is clear of what stands on the table, or the clearest of those drawn."""
-
-    def clearance_m(place: tuple[float, float]) -> float:
-        return min(math.dist(place, o.position_m[:2]) for o in percept.objects)
-
-    drawn = [_somewhere(spec, rng) for _ in range(N_TRIES)]
-    return next((place for place in drawn if clearance_m(place) > CLEAR_M), max(drawn, key=clearance_m))
+    while True:
+        x, y = rng.uniform([low[0] + INSIDE_M, low[1] + INSIDE_M], [high[0] - INSIDE_M, high[1] - INSIDE_M])
+        yield float(x), float(y)

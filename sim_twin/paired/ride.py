@@ -22,13 +22,15 @@ from sim_twin.controller.process import ControllerProcess
 from sim_twin.controller.server import Setup
 from sim_twin.controller.trace import read_trace
 from sim_twin.paired.curves import Array, Distance, Track, compare
-from sim_twin.paired.errands import Errand, Pace, drive_errand
+from sim_twin.paired.errands import Errand, Kind, drive_errand
 from sim_twin.plant import TwinPlant
 
 __all__ = ["Compared", "DisturbedError", "Pair", "wired_rig"]
 
-N_TRIES = 4
-SERIAL_PORT_OF_BUS = 7447
+N_TRIES = 8
+LOST_S = 0.02
+"""Where a controller's own time fell so far behind, the set-point ran ahead of the arm, which then cut its corners."""
+BUS_PORT = 7447
 
 
 class DisturbedError(RuntimeError):
@@ -49,7 +51,7 @@ class Compared(msgspec.Struct, frozen=True, kw_only=True):
 def wired_rig(host: str) -> Resolved:
     """Return the rig virtual_lab for a controller, and its bus, at another loopback address."""
     resolved = resolve(rig="virtual_lab")
-    rig = msgspec.structs.replace(resolved.rig, address=host, bus=f"tcp/{host}:{SERIAL_PORT_OF_BUS}")
+    rig = msgspec.structs.replace(resolved.rig, address=host, bus=f"tcp/{host}:{BUS_PORT}")
     return msgspec.structs.replace(resolved, rig=rig)
 
 
@@ -91,13 +93,13 @@ class Pair:
         self._twin.close()
         self._folder.cleanup()
 
-    def run(self, *, seed: int, epoch: int = 0, pace: Pace | None = None) -> Compared:
+    def run(self, kind: Kind, *, seed: int, epoch: int = 0) -> Compared:
         """Drive an errand on the twin, send its intents over the wire and compare the tools' paths.
 
         Raises:
             DisturbedError: the wire's station latched each time.
         """
-        errand = drive_errand(self._twin, seed=seed, epoch=epoch, pace=pace or Pace())
+        errand = drive_errand(self._twin, kind=kind, seed=seed, epoch=epoch)
         twin = self._twin_track(len(errand.intents))
         for n_disturbed in range(N_TRIES):
             wire = self._send(errand)
@@ -121,22 +123,26 @@ class Pair:
         return self._track(np.array([t for t, _ in rows]), np.array([q for _, q in rows]))
 
     def _send(self, errand: Errand) -> Track | None:
-        """Send an errand's intents over the wire; None where they were cut short."""
+        """Send an errand's intents over the wire; None where it was disturbed."""
         try:
             if self._wire is None:
                 self._wire = OperatedStation(build_station(self._wired), build_operator(self._wired.rig))
                 self._wire.connect()
             self._wire.reset(seed=errand.seed, epoch=errand.epoch)
-            since_s = monotonic()
+            times_s = [monotonic()]
             for intent in errand.intents:
                 if self._wire.step(intent).is_void:
                     return None
+                times_s.append(monotonic())
         except RobotError:
             self._leave()
             return None
-        until_s = monotonic()
-        rows = read_trace(self._trace, since_s=since_s)
-        rows = rows[rows[:, 0] <= until_s]
+        rows = read_trace(self._trace, since_s=times_s[0])
+        rows = rows[rows[:, 0] <= times_s[-1]]
+        late_s = float(np.diff(times_s).max())
+        lost_s = float(np.ptp(rows[:, 0]) - np.ptp(rows[:, 1]) * SLICE_S)
+        if late_s > self._wired.arm.motion.intent_max_age_s or lost_s > LOST_S:
+            return None
         return self._track(rows[:, 1] * SLICE_S, rows[:, 3:9])
 
     def _track(self, t_s: Array, q_rad: Array) -> Track:
