@@ -1,4 +1,4 @@
-"""One errand on the twin in lock-step and, from the same reset, through servo process, genuine client and controller."""
+"""One errand on the twin in lock-step and, from the same reset, through servo process, client and controller."""
 
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -60,6 +60,9 @@ class Pair:
 
     Args:
         host: A loopback address that is free.
+
+    Attributes:
+        n_tries: How often an errand was sent over the wire, disturbed ones too.
     """
 
     def __init__(self, host: str) -> None:
@@ -67,10 +70,9 @@ class Pair:
         self._trace = Path(self._folder.name) / "trace"
         self._wired = wired_rig(host)
         rig = self._wired.rig
-        assert rig.bus is not None and rig.cell is not None, "virtual_lab names both"
-        self._controller = ControllerProcess(
-            Setup(host=host, cell=rig.cell, bus=rig.bus, trace=str(self._trace))
-        )
+        assert rig.bus is not None, "virtual_lab names one"
+        assert rig.cell is not None, "virtual_lab names one"
+        self._controller = ControllerProcess(Setup(host=host, cell=rig.cell, bus=rig.bus, trace=str(self._trace)))
         resolved = resolve(rig="twin")
         self._plant = TwinPlant(arm=resolved.arm, scenario=resolved.scenario, rig=resolved.rig)
         self._twin = OperatedStation(build_station(resolved, plant=self._plant), build_operator(resolved.rig))
@@ -78,6 +80,7 @@ class Pair:
         self._rows: list[tuple[float, Vec6]] = []
         self._plant.world.step_physics = self._step_twin
         self._wire: OperatedStation | None = None
+        self.n_tries = 0
 
     def __enter__(self) -> Self:
         """Start the controller; the twin is armed, the wire is with the first errand."""
@@ -88,7 +91,7 @@ class Pair:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        self._leave()
+        self.release()
         self._controller.close()
         self._twin.close()
         self._folder.cleanup()
@@ -102,6 +105,7 @@ class Pair:
         errand = drive_errand(self._twin, kind=kind, seed=seed, epoch=epoch)
         twin = self._twin_track(len(errand.intents))
         for n_disturbed in range(N_TRIES):
+            self.n_tries += 1
             wire = self._send(errand)
             if wire is not None:
                 return Compared(
@@ -111,6 +115,18 @@ class Pair:
                     n_disturbed=n_disturbed,
                 )
         raise DisturbedError(f"errand of seed {seed}: cut short {N_TRIES} times over the wire")
+
+    def release(self) -> None:
+        """Let go of the arm on the wire; the next errand takes it again. Idempotent."""
+        wire, self._wire = self._wire, None
+        if wire is not None:
+            wire.close()
+
+    def write_rig(self) -> Path:
+        """Return a file of the rig on the wire, for others; it lasts as long as this does."""
+        path = Path(self._folder.name) / "virtual_lab.yaml"
+        path.write_bytes(msgspec.yaml.encode(self._wired.rig))
+        return path
 
     def _step_twin(self, model: mujoco.MjModel, data: mujoco.MjData, nstep: int) -> None:
         mujoco.mj_step(model, data, nstep)
@@ -135,7 +151,7 @@ class Pair:
                     return None
                 times_s.append(monotonic())
         except RobotError:
-            self._leave()
+            self.release()
             return None
         rows = read_trace(self._trace, since_s=times_s[0])
         rows = rows[rows[:, 0] <= times_s[-1]]
@@ -148,11 +164,6 @@ class Pair:
     def _track(self, t_s: Array, q_rad: Array) -> Track:
         """Return the tool's track, its time from 0 on.  (n,), (n, 6)"""
         return Track(t_s=t_s - t_s[0], p_m=np.array([self._chain.tcp(_vec6(q)) for q in q_rad]))
-
-    def _leave(self) -> None:
-        wire, self._wire = self._wire, None
-        if wire is not None:
-            wire.close()
 
 
 def _vec6(values: Array) -> Vec6:
