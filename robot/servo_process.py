@@ -1,13 +1,13 @@
 """The process that holds an arm: motion, gate and client, and nothing else. It ticks as long as it is in command.
 
-Between intents the arm goes on to where the last one led, until that is older than an intent may be; then it is brought
-to rest and held there. Time steps that follow one another begin on a grid: what the station took to decide is part of
-the step that it decided on. So its own time bends no path, and the controller's watchdog is fed by commands that passed
-the gate, and by nothing else. When the pipe to its station closes it stops the arm and ends. After a loss of the arm it
-ends too, at once where nothing is known of the arm any more: the client library must never get the chance to reconnect
-and go on by itself. What latched is told before the arm is stopped, for a stop takes its time. Ctrl-C at the terminal is
-the station's to decide on: this process is in a group of its own, so that it does not vanish from under an epoch that is
-to be finished.
+Between intents the arm goes on to where the last one led, until that is older than an intent may be; then it is
+brought to rest and held there. Time steps that follow one another begin on a grid: what the station took to decide is
+part of the step that it decided on. So its own time bends no path, and the controller's watchdog is fed by commands
+that passed the gate, and by nothing else. When the pipe to its station closes it stops the arm and ends. After a loss
+of the arm it ends too, at once where nothing is known of the arm any more: the client library must never get the
+chance to reconnect and go on by itself. What latched is told before the arm is stopped, for a stop takes its time.
+Ctrl-C at the terminal is the station's to decide on: this process is in a group of its own, so that it does not vanish
+from under an epoch that is to be finished.
 """
 
 import os

@@ -27,7 +27,7 @@ from sim_twin.plant import TwinPlant
 
 __all__ = ["Compared", "DisturbedError", "Pair", "wired_rig"]
 
-N_TRIES = 8
+N_TRIES = 6
 LOST_S = 0.02
 """Where a controller's own time fell so far behind, the set-point ran ahead of the arm, which then cut its corners."""
 BUS_PORT = 7447
@@ -150,16 +150,15 @@ class Pair:
                 if self._wire.step(intent).is_void:
                     return None
                 times_s.append(monotonic())
+                if times_s[-1] - times_s[-2] > self._wired.arm.motion.intent_max_age_s:
+                    return None  # an intent grew too old meanwhile and the arm was braked, as it should be
         except RobotError:
             self.release()
             return None
         rows = read_trace(self._trace, since_s=times_s[0])
         rows = rows[rows[:, 0] <= times_s[-1]]
-        late_s = float(np.diff(times_s).max())
         lost_s = float(np.ptp(rows[:, 0]) - np.ptp(rows[:, 1]) * SLICE_S)
-        if late_s > self._wired.arm.motion.intent_max_age_s or lost_s > LOST_S:
-            return None
-        return self._track(rows[:, 1] * SLICE_S, rows[:, 3:9])
+        return self._track(rows[:, 1] * SLICE_S, rows[:, 3:9]) if lost_s <= LOST_S else None
 
     def _track(self, t_s: Array, q_rad: Array) -> Track:
         """Return the tool's track, its time from 0 on.  (n,), (n, 6)"""

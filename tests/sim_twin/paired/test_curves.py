@@ -27,7 +27,7 @@ def test_a_parallel_line_is_as_far_as_it_lies_apart_and_a_detour_as_far_as_it_le
     line = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]])
     bent = np.array([[0.0, 0.0, 0.0], [0.5, 0.02, 0.0], [1.0, 0.0, 0.0]])
     there_and_back = np.array([[0.0, 0.0, 0.0], [0.6, 0.0, 0.0], [0.4, 0.0, 0.0], [1.0, 0.0, 0.0]])
-    apart = discrete_frechet_m(even_points(line), even_points(line + [0.0, 0.01, 0.0]))
+    apart = discrete_frechet_m(even_points(line), even_points(line + np.array([0.0, 0.01, 0.0])))
     assert apart == pytest.approx(0.01, abs=1e-6)
     assert discrete_frechet_m(even_points(line), even_points(bent)) == pytest.approx(0.02, abs=5e-4)
     assert discrete_frechet_m(even_points(line), even_points(there_and_back)) == pytest.approx(0.1, abs=5e-4)

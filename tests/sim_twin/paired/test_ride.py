@@ -1,4 +1,4 @@
-"""The same intents in lock-step and through servo process, genuine client and controller lead the tool along one path."""
+"""The same intents, in lock-step and through servo process, client and controller, lead the tool along one path."""
 
 import pytest
 
