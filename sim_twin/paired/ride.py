@@ -9,6 +9,7 @@ from typing import Self
 import msgspec
 import mujoco
 import numpy as np
+from numpy.typing import NDArray
 
 from config.loader import resolve
 from config.resolved import Resolved
@@ -21,7 +22,7 @@ from sim_twin.controller.motion import SLICE_S
 from sim_twin.controller.process import ControllerProcess
 from sim_twin.controller.server import Setup
 from sim_twin.controller.trace import read_trace
-from sim_twin.paired.curves import Array, Distance, Track, compare
+from sim_twin.paired.curves import Distance, Track, compare
 from sim_twin.paired.errands import Errand, Kind, drive_errand
 from sim_twin.plant import TwinPlant
 
@@ -30,6 +31,8 @@ __all__ = ["Compared", "DisturbedError", "Pair", "wired_rig"]
 N_TRIES = 6
 LOST_S = 0.02
 """Where a controller's own time fell so far behind, the set-point ran ahead of the arm, which then cut its corners."""
+LATE_S = 0.05
+"""Where a servo process lost so much time, the arm caught up with a set-point that stood still: fuller corners."""
 BUS_PORT = 7447
 
 
@@ -157,14 +160,19 @@ class Pair:
             return None
         rows = read_trace(self._trace, since_s=times_s[0])
         rows = rows[rows[:, 0] <= times_s[-1]]
-        lost_s = float(np.ptp(rows[:, 0]) - np.ptp(rows[:, 1]) * SLICE_S)
-        return self._track(rows[:, 1] * SLICE_S, rows[:, 3:9]) if lost_s <= LOST_S else None
+        spent_s = float(np.ptp(rows[:, 1])) * SLICE_S
+        lost_s = float(np.ptp(rows[:, 0])) - spent_s
+        late_s = spent_s - len(errand.intents) * self._wire.spec.step_s
+        if lost_s > LOST_S or late_s > LATE_S:
+            return None
+        return self._track(SLICE_S * rows[:, 1], rows[:, 3:9])
 
-    def _track(self, t_s: Array, q_rad: Array) -> Track:
+    def _track(self, t_s: NDArray[np.floating], q_rad: NDArray[np.floating]) -> Track:
         """Return the tool's track, its time from 0 on.  (n,), (n, 6)"""
+        t_s = np.asarray(t_s, dtype=np.float64)
         return Track(t_s=t_s - t_s[0], p_m=np.array([self._chain.tcp(_vec6(q)) for q in q_rad]))
 
 
-def _vec6(values: Array) -> Vec6:
+def _vec6(values: NDArray[np.floating]) -> Vec6:
     a, b, c, d, e, f = values.tolist()
     return a, b, c, d, e, f

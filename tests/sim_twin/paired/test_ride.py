@@ -5,7 +5,8 @@ import pytest
 from sim_twin.paired import DisturbedError, Kind, Pair
 from sim_twin.paired.bench import path_results
 
-FRECHET_M = 3e-3
+FRECHET_M = {Kind.MOVES: 8e-3, Kind.DESCENT: 3e-3, Kind.PRESS: 3e-3}
+"""Corners at full speed are cut by more or less with the tick and with when an intent comes: docs/virtual-controller.md."""
 OFFSET_S = 0.06
 
 
@@ -26,7 +27,7 @@ def check(compared):
     distance = compared.distance
     assert compared.start_m < 1e-4
     assert distance.length_m > 0.1
-    assert distance.frechet_m <= FRECHET_M
+    assert distance.frechet_m <= FRECHET_M[compared.errand.kind]
     assert abs(distance.offset_s) <= OFFSET_S
 
 
