@@ -6,7 +6,7 @@ from sim_twin.paired import DisturbedError, Kind, Pair
 from sim_twin.paired.bench import path_results
 
 FRECHET_M = {Kind.MOVES: 8e-3, Kind.DESCENT: 3e-3, Kind.PRESS: 3e-3}
-"""Corners at full speed are cut by more or less with the tick and with when an intent comes: docs/virtual-controller.md."""
+"""Corners at full speed are cut by more or less with the tick and an intent's delay: docs/virtual-controller.md."""
 OFFSET_S = 0.06
 
 
