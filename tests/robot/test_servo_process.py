@@ -47,7 +47,7 @@ class Served:
             when_latched=lambda verdict: self.server.latched(verdict),
         )  # fmt: skip
         self.server = ServoServer(
-            connection=theirs, plant=self.plant, loop=loop, tool=rig.arm.tool, pulse=self.pulse, die=self.die
+            connection=theirs, plant=self.plant, loop=loop, arm=rig.arm, pulse=self.pulse, die=self.die
         )
         self.thread = Thread(target=self.run)
         self.thread.start()
@@ -142,3 +142,59 @@ def test_a_latch_that_crosses_a_time_step_on_the_way_answers_it_once(served, mon
         served.plant.arm.mode = ArmMode.RUNNING
         assert client.seed().mode is ArmMode.RUNNING  # and the refusal of the time step is not taken for this answer
     assert isinstance(served.ask(Close()), Done)
+
+
+class Unserved:
+    """A server that ticks when it is told to, over a fake arm: what a station's own time comes to."""
+
+    def __init__(self):
+        rig = fake_rig()
+        self.plant = FakePlant(arm=rig.arm, scenario=rig.scenario, rig=rig.rig)
+        self.ours, theirs = Pipe()
+        self.loop = TickLoop(
+            arm=self.plant.arm, config=rig.arm, scenario=rig.scenario, rule_sets=rig.rule_sets, rig=rig.rig
+        )
+        self.server = ServoServer(
+            connection=theirs, plant=self.plant, loop=self.loop, arm=rig.arm, pulse=[0], die=lambda: None,
+        )  # fmt: skip
+        for request in (Connect(), Engage(), Seed()):
+            self.server._answer(request)
+            self.ours.recv_bytes()
+
+    def stride(self, *, n_gap):
+        """Carry out a time step of five ticks after a station took so many to decide; return its ticks and its end."""
+        for _ in range(n_gap):
+            self.server._tick()
+        intent = Heading(heading_rad=0.0, distance_m=0.01, height_m=0.2)
+        grip = GripCommand(opening_m=0.085, force_n=20.0, speed_m_s=0.15)
+        self.server._answer(StrideRequest(intent=pack_intent(intent), grip=grip, n_ticks=5, is_hand_busy=False))
+        n = 0
+        while not self.ours.poll(0.0):
+            self.server._tick()
+            n += 1
+        return n, msgspec.msgpack.decode(self.ours.recv_bytes(), type=Reply).stride
+
+
+def strides(gaps):
+    served = Unserved()
+    return [served.stride(n_gap=n) for n in gaps]
+
+
+def test_what_a_station_takes_to_decide_is_part_of_the_time_step_and_bends_no_path():
+    at_once, later = strides([0] * 8), strides([0, 1, 2, 0, 1, 2, 1, 0])
+    assert [n for n, _ in at_once] == [5] * 8
+    assert [n for n, _ in later] == [5, 4, 3, 5, 4, 3, 4, 5]
+    for (_, one), (_, other) in zip(at_once, later, strict=True):
+        assert other.target_m == pytest.approx(one.target_m, abs=1e-9)
+
+
+def test_an_intent_that_is_too_old_ends_in_a_rest_short_of_where_it_led():
+    served = Unserved()
+    for _ in range(8):
+        _, stride = served.stride(n_gap=0)
+    for _ in range(60):
+        served.server._tick()
+    rest_m = served.loop.report(None, is_begun=True).target_m
+    assert stride.after.tcp_position_m[0] < rest_m[0] <= stride.target_m[0]
+    assert served.plant.arm.read().tcp_position_m == pytest.approx(rest_m, abs=1e-3)
+    assert served.stride(n_gap=0)[0] == 5
