@@ -1,13 +1,14 @@
 """The process that holds an arm: motion, gate and client, and nothing else. It ticks as long as it is in command.
 
-Between intents the arm goes on to where the last one led, until that is older than an intent may be; then it is
-brought to rest and held there. Time steps that follow one another begin on a grid: what the station took to decide is
-part of the step that it decided on. So its own time bends no path, and the controller's watchdog is fed by commands
-that passed the gate, and by nothing else. When the pipe to its station closes it stops the arm and ends. After a loss
-of the arm it ends too, at once where nothing is known of the arm any more: the client library must never get the
-chance to reconnect and go on by itself. What latched is told before the arm is stopped, for a stop takes its time.
-Ctrl-C at the terminal is the station's to decide on: this process is in a group of its own, so that it does not vanish
-from under an epoch that is to be finished.
+Time steps that follow one another lie on a grid. An intent begins a little into its step, always as far, so that what a
+station takes to decide bends no path; meanwhile the arm goes on to where the last intent led. Once that is older than
+an intent may be, the arm is brought to rest and held there. So the controller's watchdog is fed by commands that passed
+the gate, and by nothing else.
+
+When the pipe to its station closes it stops the arm and ends. After a loss of the arm it ends too, at once where nothing
+is known of the arm any more: the client library must never get the chance to reconnect and go on by itself. What latched
+is told before the arm is stopped, for a stop takes its time. Ctrl-C at the terminal is the station's to decide on: this
+process is in a group of its own, so that it does not vanish from under an epoch that is to be finished.
 """
 
 import os
@@ -47,6 +48,9 @@ from robot.tick_loop import TickLoop
 
 __all__ = ["ServoServer", "serve"]
 
+BEGIN_S = 0.01
+"""How far into a time step its intent begins, at most half of it: as long as a station may take to decide. One that takes
+longer shifts a corner by the tool's speed times the rest."""
 IDLE_S = 0.002
 """How long a process that is not in command waits for a request at a time."""
 LOST = Reason.STALE_STATE.value
@@ -127,6 +131,7 @@ class ServoServer:
     ) -> None:
         self._connection, self._plant, self._loop, self._tool = connection, plant, loop, arm.tool
         self._intent_max_age_ns = round(arm.motion.intent_max_age_s * 1e9)
+        self._begin_ticks = round(BEGIN_S * plant.arm.spec.rate_hz)
         self._pulse, self._die = pulse, die
         self._decode = msgspec.msgpack.Decoder(Request).decode
         self._encode = msgspec.msgpack.Encoder().encode
@@ -168,9 +173,9 @@ class ServoServer:
             if not self._n_left:
                 self._n_over = 0
                 self._send(StrideReply(stride=self._loop.report(None, is_begun=True)))
-        elif not self._is_resting:
+        else:
             self._n_over += 1
-            if self._now_ns() - self._intent_ns >= self._intent_max_age_ns:
+            if not self._is_resting and self._now_ns() - self._intent_ns >= self._intent_max_age_ns:
                 self._rest()
 
     def _answer(self, request: Request) -> None:
@@ -185,17 +190,21 @@ class ServoServer:
         self._send(reply)
 
     def _begin_stride(self, request: StrideRequest) -> None:
+        n_ticks = request.n_ticks
+        if self._is_resting:
+            self._n_over = 0
+        while self._is_in_command and self._n_over < min(self._begin_ticks, n_ticks // 2):
+            self._tick()
         if not self._is_in_command:
             self._send(Failure(kind=SafetyError.__name__, message="expected an engaged arm; engage and seed it first"))
             return
         self._grip = request.grip
         self._is_beginning = True
         intent = unpack_intent(request.intent)
-        verdict = self._loop.begin(intent, n_ticks=request.n_ticks, is_hand_busy=request.is_hand_busy)
+        verdict = self._loop.begin(intent, n_ticks=n_ticks, is_hand_busy=request.is_hand_busy)
         self._is_beginning = False
         if verdict is None:
-            n_over = 0 if self._is_resting else self._n_over
-            self._n_left = max(request.n_ticks - n_over, (request.n_ticks + 1) // 2)
+            self._n_left = max(n_ticks - self._n_over, n_ticks - n_ticks // 2)
             self._intent_ns, self._is_resting = self._now_ns(), False
 
     def _obey(self, request: Request) -> Reply:
