@@ -5,10 +5,10 @@ station takes to decide bends no path; meanwhile the arm goes on to where the la
 an intent may be, the arm is brought to rest and held there. So the controller's watchdog is fed by commands that passed
 the gate, and by nothing else.
 
-When the pipe to its station closes it stops the arm and ends. After a loss of the arm it ends too, at once where nothing
-is known of the arm any more: the client library must never get the chance to reconnect and go on by itself. What latched
-is told before the arm is stopped, for a stop takes its time. Ctrl-C at the terminal is the station's to decide on: this
-process is in a group of its own, so that it does not vanish from under an epoch that is to be finished.
+When the pipe to its station closes it stops the arm and ends. After a loss of the arm it ends too, at once where
+nothing is known of the arm any more: the client library must never get the chance to reconnect and go on by itself.
+What latched is told before the arm is stopped, for a stop takes its time. Ctrl-C at the terminal is the station's to
+decide on: this process is in a group of its own, so that it does not vanish from under an epoch that is to be finished.
 """
 
 import os
@@ -49,8 +49,8 @@ from robot.tick_loop import TickLoop
 __all__ = ["ServoServer", "serve"]
 
 BEGIN_S = 0.01
-"""How far into a time step its intent begins, at most half of it: as long as a station may take to decide. One that takes
-longer shifts a corner by the tool's speed times the rest."""
+"""How far into a time step its intent begins, at most half of it: as long as a station may take to decide. One that
+takes longer shifts a corner by the tool's speed times the rest."""
 IDLE_S = 0.002
 """How long a process that is not in command waits for a request at a time."""
 LOST = Reason.STALE_STATE.value

@@ -2,9 +2,9 @@
 
 from sim_twin.paired.curves import Track, compare, discrete_frechet_m, even_points
 from sim_twin.paired.errands import Errand, Kind, drive_errand
-from sim_twin.paired.ride import Compared, DisturbedError, Pair
+from sim_twin.paired.ride import Compared, CutShortError, DisturbedError, Pair
 
 __all__ = [
-    "Compared", "DisturbedError", "Errand", "Kind", "Pair", "Track", "compare", "discrete_frechet_m", "drive_errand",
-    "even_points",
+    "Compared", "CutShortError", "DisturbedError", "Errand", "Kind", "Pair", "Track", "compare", "discrete_frechet_m",
+    "drive_errand", "even_points",
 ]  # fmt: skip
