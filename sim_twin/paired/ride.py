@@ -22,23 +22,24 @@ from sim_twin.controller.server import Setup
 from sim_twin.paired.curves import Distance, Track, compare
 from sim_twin.paired.errands import Errand, Kind, drive_errand
 from sim_twin.paired.machine import Spare
-from sim_twin.paired.wire import Sent, Wire
+from sim_twin.paired.wire import Wire
 from sim_twin.plant import TwinPlant
 
 __all__ = ["Compared", "CutShortError", "DisturbedError", "Pair", "wired_rig"]
 
 N_TRIES = 6
-SPARE_SHARE = 0.15
-"""Where less than this of the processors' time was idle, processes had to wait for one another."""
+SPARE_SHARE = 0.3
+"""Where less than this of the processors' time was idle, processes had to wait for one another. Nobody else about, the
+three of an errand leave half of two."""
 BUS_PORT = 7447
 
 
 class CutShortError(RuntimeError):
-    """No try came to its end in time, and it was not this machine that kept it from that."""
+    """No try came to its end in time, in most of them though this machine had processor time to spare."""
 
 
 class DisturbedError(RuntimeError):
-    """No try came to its end in time, and this machine was busy all along."""
+    """No try came to its end in time, and this machine was busy in half of them or more."""
 
 
 class Compared(msgspec.Struct, frozen=True, kw_only=True):
@@ -106,29 +107,28 @@ class Pair:
         """Drive an errand on the twin, send its intents over the wire and compare the tools' paths.
 
         Raises:
-            DisturbedError: no try came to its end in time on a machine that was busy in each of them.
+            DisturbedError: no try came to its end in time on a machine that was busy.
             CutShortError: nor did any on one that was not.
         """
         errand = drive_errand(self._twin, kind=kind, seed=seed, epoch=epoch)
         twin = self._twin_track(len(errand.intents))
-        is_busy, why = True, ""
+        n_spared, told = 0, []
         for _ in range(self._n_tries):
             self.n_sent += 1
             spare = Spare().begin()
             sent = self._wire.send(errand)
             if sent.disturbed is None:
-                wire = self._wire_track(sent)
+                wire = self._track(sent.t_s, sent.q_rad)
                 return Compared(
                     errand=errand,
                     distance=compare(twin, wire),
                     start_m=float(np.linalg.norm(twin.p_m[0] - wire.p_m[0])),
                 )
             share = spare.share()
-            if share >= SPARE_SHARE or not why:
-                why = f"{sent.disturbed}, {share:.0%} of the processors' time to spare"
-            is_busy = is_busy and share < SPARE_SHARE
-        error = DisturbedError if is_busy else CutShortError
-        raise error(f"{kind} of seed {seed}: sent {self._n_tries} times over the wire, {why}")
+            n_spared += share >= SPARE_SHARE
+            told.append(f"{sent.disturbed} ({share:.0%} of the processors' time to spare)")
+        error = CutShortError if 2 * n_spared > self._n_tries else DisturbedError
+        raise error(f"{kind} of seed {seed}, sent over the wire: {'; '.join(told)}")
 
     def write_rig(self) -> Path:
         """Return a file of the rig on the wire, for others; it lasts as long as this does."""
@@ -145,9 +145,6 @@ class Pair:
         n_ticks = n_steps * round(self._twin.spec.step_s / self._plant.world.tick_s)
         rows, self._rows = self._rows[-n_ticks - 1 :], []
         return self._track(np.array([t for t, _ in rows]), np.array([q for _, q in rows]))
-
-    def _wire_track(self, sent: Sent) -> Track:
-        return self._track(sent.t_s, sent.q_rad)
 
     def _track(self, t_s: NDArray[np.float64], q_rad: NDArray[np.float64]) -> Track:
         """Return the tool's track, its time from 0 on.  (n,), (n, 6)"""

@@ -19,8 +19,9 @@ __all__ = ["Sent", "Wire", "why_disturbed"]
 
 LOST_S = 0.02
 """Where a controller's own time fell so far behind, the set-point ran ahead of the arm, which then cut its corners."""
-LATE_S = 0.05
-"""Where a servo process lost so much time, the arm caught up with a set-point that stood still: fuller corners."""
+LATE_STEP_S, LATE_S = 0.02, 0.05
+"""Where a servo process lost so much time, in one time step or in all, the arm caught up with a set-point that stood
+still: fuller corners."""
 
 
 class Sent(msgspec.Struct, frozen=True, kw_only=True):
@@ -70,7 +71,6 @@ class Wire:
             stamps_s=rows[:, 0],
             slices=rows[:, 1],
             step_s=self._wired.arm.motion.step_s,
-            intent_max_age_s=self._wired.arm.motion.intent_max_age_s,
         )
         return Sent(t_s=SLICE_S * rows[:, 1], q_rad=rows[:, 3:9], disturbed=disturbed)
 
@@ -96,7 +96,6 @@ def why_disturbed(
     stamps_s: NDArray[np.float64],
     slices: NDArray[np.float64],
     step_s: float,
-    intent_max_age_s: float,
 ) -> str | None:
     """Return in words what of the machine's doing bent a path, None where nothing did.
 
@@ -105,11 +104,10 @@ def why_disturbed(
         stamps_s: The host's time of each slice of the controller meanwhile.  (n,)
         slices: The slices' numbers.  (n,)
         step_s: How long a time step should last.
-        intent_max_age_s: When an intent is too old and the arm is braked.
     """
     longest_s = float(np.diff(times_s).max())
-    if longest_s > intent_max_age_s:
-        return f"a time step of {1e3 * longest_s:.0f} ms, after which the intent was too old"
+    if longest_s > step_s + LATE_STEP_S:
+        return f"a time step of {1e3 * longest_s:.0f} ms"
     spent_s = float(np.ptp(slices)) * SLICE_S
     lost_s = float(np.ptp(stamps_s)) - spent_s
     if lost_s > LOST_S:

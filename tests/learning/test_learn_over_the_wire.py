@@ -19,9 +19,9 @@ from tests.support.small_lab import SERIAL, autotelic, children_of, controller_o
 HOST = "127.0.0.61"
 ENDLESS = """\
 name: endless
-experiment: {epochs: 1, trials: 1, steps: 2000, evaluate_every: 50, test_epochs: 1, checkpoint_every: 1}
+experiment: {epochs: 1000, trials: 1, steps: 2000, evaluate_every: 50, test_epochs: 1, checkpoint_every: 1}
 """
-"""An epoch of more than a minute: a second Ctrl-C comes while it is in hand."""
+"""Epochs of up to a minute: the second Ctrl-C comes while the one in hand at the first still is."""
 
 
 @pytest.fixture(scope="module")
@@ -137,7 +137,6 @@ def test_a_second_ctrl_c_ends_it_at_once(lab):
             process.kill()
     assert servo, said
     assert (process.returncode, "stopped at once" in "".join(said)) == (130, True), said
-    assert epochs_of(folder / "twice") == []
     assert_over(controller, servo)
 
 

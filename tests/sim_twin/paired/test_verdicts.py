@@ -9,7 +9,7 @@ from sim_twin.paired.curves import Distance
 from sim_twin.paired.machine import Spare, spare_share
 from sim_twin.paired.wire import why_disturbed
 
-STEP_S, MOST_S, SLICE_S = 0.05, 0.1, 0.002
+STEP_S, SLICE_S = 0.05, 0.002
 N_STEPS = 10
 
 
@@ -22,9 +22,7 @@ def told(*, longest_s=STEP_S, controller_lost_s=0.0, servo_lost_s=0.0):
     stamps_s = 7.0 + SLICE_S * np.arange(n)
     stamps_s[n // 2 :] += controller_lost_s
     times_s = [7.0, *(7.0 + np.cumsum(steps_s)).tolist()]
-    return why_disturbed(
-        times_s=times_s, stamps_s=stamps_s, slices=slices, step_s=STEP_S, intent_max_age_s=MOST_S
-    )  # fmt: skip
+    return why_disturbed(times_s=times_s, stamps_s=stamps_s, slices=slices, step_s=STEP_S)
 
 
 def test_an_errand_in_time_is_not_disturbed():
@@ -33,7 +31,7 @@ def test_an_errand_in_time_is_not_disturbed():
 
 @pytest.mark.parametrize(
     ("lost", "most_s", "word"),
-    [("longest_s", 0.1, "too old"), ("controller_lost_s", 0.02, "controller"), ("servo_lost_s", 0.05, "servo")],
+    [("longest_s", 0.07, "time step of"), ("controller_lost_s", 0.02, "controller"), ("servo_lost_s", 0.05, "servo")],
 )
 def test_time_lost_is_borne_up_to_a_limit_and_named_beyond(lost, most_s, word):
     assert told(**{lost: most_s - 0.003}) is None
