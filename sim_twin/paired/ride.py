@@ -146,11 +146,12 @@ class Pair:
         rows, self._rows = self._rows[-n_ticks - 1 :], []
         return self._track(np.array([t for t, _ in rows]), np.array([q for _, q in rows]))
 
-    def _track(self, t_s: NDArray[np.float64], q_rad: NDArray[np.float64]) -> Track:
+    def _track(self, t_s: NDArray[np.floating], q_rad: NDArray[np.floating]) -> Track:
         """Return the tool's track, its time from 0 on.  (n,), (n, 6)"""
+        t_s = np.asarray(t_s, dtype=np.float64)
         return Track(t_s=t_s - t_s[0], p_m=np.array([self._chain.tcp(_vec6(q)) for q in q_rad]))
 
 
-def _vec6(values: NDArray[np.float64]) -> Vec6:
+def _vec6(values: NDArray[np.floating]) -> Vec6:
     a, b, c, d, e, f = values.tolist()
     return a, b, c, d, e, f

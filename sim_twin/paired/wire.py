@@ -27,9 +27,9 @@ still: fuller corners."""
 class Sent(msgspec.Struct, frozen=True, kw_only=True):
     """What became of an errand."""
 
-    t_s: NDArray[np.float64]  # (n,)
+    t_s: NDArray[np.floating]  # (n,)
     """The controller's time."""
-    q_rad: NDArray[np.float64]  # (n, 6)
+    q_rad: NDArray[np.floating]  # (n, 6)
     """Joints of the physics."""
     disturbed: str | None
     """What kept the errand from its end or from its time, in words; None where nothing did."""
@@ -93,8 +93,8 @@ class Wire:
 def why_disturbed(
     *,
     times_s: list[float],
-    stamps_s: NDArray[np.float64],
-    slices: NDArray[np.float64],
+    stamps_s: NDArray[np.floating],
+    slices: NDArray[np.floating],
     step_s: float,
 ) -> str | None:
     """Return in words what of the machine's doing bent a path, None where nothing did.
