@@ -1,5 +1,7 @@
 """A test of what a run's newest checkpoint holds, apart from the run itself."""
 
+from collections.abc import Callable
+
 from config.loader import with_rig
 from learning.assembly import RobotLearner
 from learning.errors import LearningError
@@ -32,7 +34,13 @@ def beliefs_of(folder: RunFolder) -> tuple[Explanation, ...]:
 
 
 def assess(
-    folder: RunFolder, *, n_tests: int, seed: int | None, rules_epoch: int | None, rig: str | None = None
+    folder: RunFolder,
+    *,
+    n_tests: int,
+    seed: int | None,
+    rules_epoch: int | None,
+    rig: str | None = None,
+    tell: Callable[[str], object] = lambda _: None,
 ) -> list[EvaluationRow]:
     """Return a row a goal: learning off, the newest checkpoint, from fresh table layouts.
 
@@ -42,6 +50,7 @@ def assess(
         seed: root seed of the layouts; None takes the run's own, which gives what the run's own evaluation gave.
         rules_epoch: epoch whose rules are in force; None takes the last one learnt.
         rig: shipped rig or a file to test on; None takes the run's own.
+        tell: told after every test epoch how far it is, in words.
 
     Raises:
         ConfigError: the rig's file is missing or wrong, or it is another arm's.
@@ -68,7 +77,10 @@ def assess(
     learner = RobotLearner(resolved, seed=manifest.seed, pictures=folder.path / "resets")
     try:
         learner.agent.load_state_dict(state["agent"])
-        scores = [run_test(learner.agent, learner.station, test) for test in tests]
+        scores = []
+        for test in tests:
+            heard = _Count(f"{manifest.goals[test.goal].name}, goal {test.goal + 1} of {n_goals}", tell)
+            scores.append(run_test(learner.agent, learner.station, test, when_tested=heard))
         predicted = learnt_graph(learner.agent)
     finally:
         learner.close()
@@ -78,3 +90,14 @@ def assess(
         wrong = graph_errors(predicted, lambda goal, latched: oracle(goal, latched, epoch), states, n_goals)
         graph = [(len(states), n) for n in wrong]
     return [evaluation_row(test, score, entry) for test, score, entry in zip(tests, scores, graph, strict=True)]
+
+
+class _Count:
+    """Tells how many test epochs of a goal were run."""
+
+    def __init__(self, goal: str, tell: Callable[[str], object]) -> None:
+        self._goal, self._tell, self._n = goal, tell, 0
+
+    def __call__(self) -> None:
+        self._n += 1
+        self._tell(f"{self._goal}: {self._n} test epochs run")

@@ -130,8 +130,8 @@ def evaluate(
 
     folder = RunFolder(run)
     goals = [goal.name for goal in folder.manifest().goals]
-    with Console(stderr=True).status(f"testing {len(goals)} goals, {tests} epochs each"):
-        rows = assess(folder, n_tests=tests, seed=seed, rules_epoch=rules_epoch, rig=rig)
+    with Console(stderr=True).status(f"testing {len(goals)} goals, {tests} epochs each") as status:
+        rows = assess(folder, n_tests=tests, seed=seed, rules_epoch=rules_epoch, rig=rig, tell=status.update)
     if json:
         typer.echo(msgspec.json.encode({"goals": goals, "rows": rows}).decode())
     else:

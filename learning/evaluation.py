@@ -58,10 +58,18 @@ class GoalScore(msgspec.Struct, frozen=True, kw_only=True):
     n_steps: int
 
 
-def run_test(agent: Agent, station: Station, test: GoalTest) -> GoalScore:
+def run_test(
+    agent: Agent, station: Station, test: GoalTest, *, when_tested: Callable[[], object] = lambda: None
+) -> GoalScore:
     """Pursue the goal from fresh table layouts.
 
     A void test epoch is repeated with another seed, as often as there are tests at most.
+
+    Args:
+        agent: who acts.
+        station: where.
+        test: what is tested.
+        when_tested: called after every test epoch, void ones too.
     """
     n_tests = n_successes = n_void = trials_achieved = trials_all = n_steps = 0
     for attempt in range(2 * test.n_tests):
@@ -70,6 +78,7 @@ def run_test(agent: Agent, station: Station, test: GoalTest) -> GoalScore:
         )
         record = agent.test_epoch(station, epoch=test.rules_epoch, seed=seed, goal=test.goal)
         n_steps += record.n_steps
+        when_tested()
         if record.is_void:
             n_void += 1
             continue

@@ -1,11 +1,14 @@
 """The process that holds an arm: motion, gate and client, and nothing else. It ticks as long as it is in command.
 
-Between intents it holds the arm at rest, so that the controller's watchdog is fed by commands that passed the gate, and
-by nothing else. When the pipe to its station closes it stops the arm and ends. After a loss of the arm it ends too,
-at once where nothing is known of the arm any more: the client library must never get the chance to reconnect and go on
-by itself. What latched is told before the arm is stopped, for a stop takes its time. Ctrl-C at the terminal is the
-station's to decide on: this process is in a group of its own, so that it does not vanish from under an epoch that is
-to be finished.
+Time steps that follow one another lie on a grid. An intent begins a little into its step, always as far, so that what a
+station takes to decide bends no path; meanwhile the arm goes on to where the last intent led. Once that is older than
+an intent may be, the arm is brought to rest and held there. So the controller's watchdog is fed by commands that passed
+the gate, and by nothing else.
+
+When the pipe to its station closes it stops the arm and ends. After a loss of the arm it ends too, at once where
+nothing is known of the arm any more: the client library must never get the chance to reconnect and go on by itself.
+What latched is told before the arm is stopped, for a stop takes its time. Ctrl-C at the terminal is the station's to
+decide on: this process is in a group of its own, so that it does not vanish from under an epoch that is to be finished.
 """
 
 import os
@@ -16,7 +19,7 @@ from multiprocessing.connection import Connection
 
 import msgspec
 
-from config.arm import Tool
+from config.arm import ArmConfig
 from config.resolved import Resolved
 from robot.errors import RobotError, SafetyError
 from robot.hal.protocols import Plant
@@ -45,6 +48,9 @@ from robot.tick_loop import TickLoop
 
 __all__ = ["ServoServer", "serve"]
 
+BEGIN_S = 0.01
+"""How far into a time step its intent begins, at most half of it: as long as a station may take to decide. One that
+takes longer shifts a corner by the tool's speed times the rest."""
 IDLE_S = 0.002
 """How long a process that is not in command waits for a request at a time."""
 LOST = Reason.STALE_STATE.value
@@ -87,7 +93,7 @@ def serve(connection: Connection, resolved_json: bytes, pulse: MutableSequence[i
         connection=connection,
         plant=plant,
         loop=loop,
-        tool=resolved.arm.tool,
+        arm=resolved.arm,
         pulse=pulse,
         die=lambda: os._exit(LOST_CODE),
     )
@@ -108,7 +114,7 @@ class ServoServer:
         connection: the pipe to the station.
         plant: what is driven.
         loop: its loop, which tells `latched`.
-        tool: of the arm's file.
+        arm: the arm's file.
         pulse: shared memory of one number: ticks so far while it ticks, otherwise 0.
         die: ends the process on the spot.
     """
@@ -119,17 +125,20 @@ class ServoServer:
         connection: Connection,
         plant: Plant,
         loop: TickLoop,
-        tool: Tool,
+        arm: ArmConfig,
         pulse: MutableSequence[int],
         die: Callable[[], object],
     ) -> None:
-        self._connection, self._plant, self._loop, self._tool = connection, plant, loop, tool
+        self._connection, self._plant, self._loop, self._tool = connection, plant, loop, arm.tool
+        self._intent_max_age_ns = round(arm.motion.intent_max_age_s * 1e9)
+        self._begin_ticks = round(BEGIN_S * plant.arm.spec.rate_hz)
         self._pulse, self._die = pulse, die
         self._decode = msgspec.msgpack.Decoder(Request).decode
         self._encode = msgspec.msgpack.Encoder().encode
         self._is_in_command = self._is_over = self._is_beginning = False
         self._grip: GripCommand | None = None
-        self._n_left = self._n_ticks = 0
+        self._n_left = self._n_over = self._n_ticks = self._intent_ns = 0
+        self._is_resting = True
 
     def run(self) -> None:
         """Serve until closed, or until the arm was lost."""
@@ -162,8 +171,12 @@ class ServoServer:
         if self._n_left:
             self._n_left -= 1
             if not self._n_left:
+                self._n_over = 0
                 self._send(StrideReply(stride=self._loop.report(None, is_begun=True)))
-                self._loop.rest()
+        else:
+            self._n_over += 1
+            if not self._is_resting and self._now_ns() - self._intent_ns >= self._intent_max_age_ns:
+                self._rest()
 
     def _answer(self, request: Request) -> None:
         if isinstance(request, StrideRequest):
@@ -177,16 +190,22 @@ class ServoServer:
         self._send(reply)
 
     def _begin_stride(self, request: StrideRequest) -> None:
+        n_ticks = request.n_ticks
+        if self._is_resting:
+            self._n_over = 0
+        while self._is_in_command and self._n_over < min(self._begin_ticks, n_ticks // 2):
+            self._tick()
         if not self._is_in_command:
             self._send(Failure(kind=SafetyError.__name__, message="expected an engaged arm; engage and seed it first"))
             return
         self._grip = request.grip
         self._is_beginning = True
         intent = unpack_intent(request.intent)
-        verdict = self._loop.begin(intent, n_ticks=request.n_ticks, wait_at_m=request.wait_at_m)
+        verdict = self._loop.begin(intent, n_ticks=n_ticks, wait_at_m=request.wait_at_m)
         self._is_beginning = False
         if verdict is None:
-            self._n_left = request.n_ticks
+            self._n_left = max(n_ticks - self._n_over, n_ticks - n_ticks // 2)
+            self._intent_ns, self._is_resting = self._now_ns(), False
 
     def _obey(self, request: Request) -> Reply:
         match request:
@@ -214,9 +233,16 @@ class ServoServer:
         self._grip = GripCommand(
             opening_m=opening_m, force_n=self._tool.grip_force_n, speed_m_s=self._tool.speed_m_s[0]
         )
-        self._loop.rest()
+        self._rest()
         self._is_in_command = True
         return state
+
+    def _rest(self) -> None:
+        self._loop.rest()
+        self._is_resting = True
+
+    def _now_ns(self) -> int:
+        return self._plant.arm.clock.now_ns()
 
     def _send(self, reply: Reply) -> None:
         self._connection.send_bytes(self._encode(reply))

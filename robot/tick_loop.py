@@ -149,7 +149,7 @@ class TickLoop:
         return None
 
     def rest(self) -> None:
-        """Come to rest and stay there: what ticks do between intents."""
+        """Come to rest and stay there: what ticks do when the last intent is too old."""
         self._mover.hold("no_intent")
 
     def tick(self, grip: GripCommand) -> Verdict | None:

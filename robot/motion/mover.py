@@ -1,6 +1,7 @@
 """Intents become joint set-points: shape, fence, guard by force, follow. State of one arm's motion."""
 
 import math
+from collections.abc import Sequence
 
 from config.arm import ArmConfig
 from robot.geometry import inside_box
@@ -15,6 +16,9 @@ JOINT_STEP_RAD = 0.35
 """Greatest change of any joint's target in one step."""
 FENCE_MARGIN_M = 1e-4
 """How far inside a fence a command comes to rest that a push would carry past it."""
+LEASH_TICK_S = 0.01
+"""The leash is held where the tool would be with ticks of this length, the twin's. A set-point is for the end of its
+tick, so that with shorter ticks the tool is behind by the difference: a leash held there would cut other corners."""
 RESEAT_SHARE = 0.9
 """Share of a joint's greatest speed at which commands fall back to the measured joints on contact."""
 
@@ -26,6 +30,8 @@ class Mover:
         self._limits = TargetLimits.of(arm, table_m)
         self._follower = Follower(arm, tick_s=tick_s)
         self._contact = ContactGuard(arm)
+        self._ahead_s = max(0.0, LEASH_TICK_S - tick_s)
+        self._ahead_m = self._ahead_s * arm.motion.speed_m_s
         self._ranges = tuple(j.range_rad for j in arm.joints)
         self._fall_back_rad = tuple(RESEAT_SHARE * j.speed_rad_s * tick_s for j in arm.joints)
         self._limiters: list[str] = []
@@ -131,7 +137,7 @@ class Mover:
         eased, is_eased = self._contact.ease(self._follower.target_m, shaped.position_m)
         if is_eased:
             self._limiters.append("contact")
-        fenced = fence(eased, state.tcp_position_m, self._limits)
+        fenced = fence(eased, self._leashed_to_m(state), self._limits)
         self._limiters.extend(fenced.limiters)
         if not self._follower.aim(fenced.position_m, yaw_rad):
             self._limiters.append("unreachable")
@@ -157,11 +163,24 @@ class Mover:
         if share < 1.0:
             self._limiters.append("max_step")
         tcp, lowest_m = follower.tcp_and_lowest(q)
-        fenced = fence(tcp, state.tcp_position_m, limits)
+        fenced = fence(tcp, self._leashed_to_m(state), limits)
         if fenced.limiters or lowest_m < limits.tip_min_m:
             self._limiters.extend(fenced.limiters or ("table",))
             return
         follower.aim_joints(q)
+
+    def _leashed_to_m(self, state: ArmState) -> Vec3:
+        """Return where the leash is held: at the tool, brought on by its joints' speeds as far as the tool may go."""
+        if self._ahead_s == 0.0:
+            return state.tcp_position_m
+        here, there = (
+            self._follower.tcp(_along(state.q_rad, state.qd_rad_s, seconds)) for seconds in (0.0, self._ahead_s)
+        )
+        x, y, z = (
+            p + max(-self._ahead_m, min(self._ahead_m, b - a))
+            for p, a, b in zip(state.tcp_position_m, here, there, strict=True)
+        )
+        return x, y, z
 
     def _back_to(self, measured_rad: Vec6) -> Vec6:
         """Return the command brought back to joints, the measured ones, as far as one tick allows."""
@@ -171,6 +190,6 @@ class Mover:
         return measured_rad if excess <= 1.0 else _along(now, change, 1.0 / excess)
 
 
-def _along(a: Vec6, change: list[float], share: float) -> Vec6:
+def _along(a: Vec6, change: Sequence[float], share: float) -> Vec6:
     x = [u + share * v for u, v in zip(a, change, strict=True)]
     return x[0], x[1], x[2], x[3], x[4], x[5]

@@ -17,6 +17,11 @@ from robot.bus import RESET, ResetRequest, open_session, topic
 from tests.support.small_lab import SERIAL, autotelic, children_of, controller_of, make_lab, start
 
 HOST = "127.0.0.61"
+ENDLESS = """\
+name: endless
+experiment: {epochs: 1000, trials: 1, steps: 2000, evaluate_every: 50, test_epochs: 1, checkpoint_every: 1}
+"""
+"""Epochs of up to a minute: the second Ctrl-C comes while the one in hand at the first still is."""
 
 
 @pytest.fixture(scope="module")
@@ -42,8 +47,8 @@ def until(is_true, timeout_s=30.0):
         time.sleep(0.02)
 
 
-def learn(out, *more):
-    return ("learn", "--rig", "rig.yaml", "--scenario", "small.yaml", "--preset", "fast.yaml", "--out", out, *more)
+def learn(out, *more, preset="fast.yaml"):
+    return ("learn", "--rig", "rig.yaml", "--scenario", "small.yaml", "--preset", preset, "--out", out, *more)
 
 
 def epochs_of(folder):
@@ -70,27 +75,29 @@ def assert_at_rest(controller):
     assert max(map(abs, after["qd_rad_s"])) < 5e-3
 
 
-def interrupt(lab, out, n_signals):
-    """Begin a run, let it learn an epoch, and press Ctrl-C so often; return its exit code and what it said."""
+def interrupt(lab, out):
+    """Begin a run, let it learn an epoch, and press Ctrl-C; return its exit code and what it said."""
     folder, controller = lab
     with start(folder, *learn(out)) as process:
         try:
             until(lambda: process.poll() is not None or epochs_of(folder / out))
             servo = children_of(process.pid)
-            for _ in range(n_signals):
-                os.killpg(process.pid, signal.SIGINT)
-                time.sleep(0.3)
+            os.killpg(process.pid, signal.SIGINT)
             _, said = process.communicate(timeout=40)
         finally:
             process.kill()
     assert servo, said
-    until(lambda: all(is_gone(pid) for pid in servo), timeout_s=5)
-    assert_at_rest(controller)
+    assert_over(controller, servo)
     return process.returncode, said
 
 
+def assert_over(controller, servo):
+    until(lambda: all(is_gone(pid) for pid in servo), timeout_s=5)
+    assert_at_rest(controller)
+
+
 def test_learning_over_the_wire_is_stopped_by_ctrl_c_and_leaves_a_checkpoint_no_process_and_no_motion(lab):
-    code, said = interrupt(lab, "run", 1)
+    code, said = interrupt(lab, "run")
     assert (code, "go on with" in said) == (130, True), said
     done = epochs_of(lab[0] / "run")
     state, _ = RunFolder(lab[0] / "run").checkpoints.newest()
@@ -102,7 +109,7 @@ def test_learning_over_the_wire_is_stopped_by_ctrl_c_and_leaves_a_checkpoint_no_
 @pytest.mark.slow
 def test_a_run_over_the_wire_goes_on_from_its_checkpoint_to_its_end(lab):
     folder, _ = lab
-    code, said = interrupt(lab, "long", 1)
+    code, said = interrupt(lab, "long")
     assert code == 130, said
     before = (folder / "long/trials.csv").read_text()
     code, out, said = autotelic(folder, *learn("long", "--resume", "--json"), timeout_s=120)
@@ -115,8 +122,22 @@ def test_a_run_over_the_wire_goes_on_from_its_checkpoint_to_its_end(lab):
 
 @pytest.mark.slow
 def test_a_second_ctrl_c_ends_it_at_once(lab):
-    code, said = interrupt(lab, "twice", 2)
-    assert (code, "stopped at once" in said) == (130, True), said
+    folder, controller = lab
+    (folder / "endless.yaml").write_text(ENDLESS)
+    with start(folder, *learn("twice", preset="endless.yaml")) as process:
+        try:
+            until(lambda: process.poll() is not None or max(map(abs, controller.fault("truth")["qd_rad_s"])) > 0.1)
+            servo = children_of(process.pid)
+            os.killpg(process.pid, signal.SIGINT)
+            said = [next(line for line in process.stderr if "stopping after this epoch" in line)]
+            os.killpg(process.pid, signal.SIGINT)
+            said += process.stderr
+            process.wait(timeout=40)
+        finally:
+            process.kill()
+    assert servo, said
+    assert (process.returncode, "stopped at once" in "".join(said)) == (130, True), said
+    assert_over(controller, servo)
 
 
 @pytest.mark.slow

@@ -1,5 +1,6 @@
 import math
 
+import msgspec
 import numpy as np
 import pytest
 
@@ -215,3 +216,47 @@ def test_a_command_held_down_at_a_fence_comes_up_to_the_tool(arm, beyond_m):
         q = arm.mover.tick(state)
         assert all(a - 1e-6 <= x <= b + 1e-6 for a, x, b in zip(low, KINEMATICS.tcp(q), high, strict=True))
     assert KINEMATICS.tcp(q)[2] == pytest.approx(measured[2], abs=1e-4)
+
+
+FAST_DT, LEASH_M = 0.002, ARM.motion.leash_m
+
+
+def leashed(tcp_m, *, tick_s, qd_rad_s=(0.0,) * 6):
+    """Return where the target is after a step towards +y with the measured tool far behind it."""
+    mover = Mover(ARM, table_m=0.0, tick_s=tick_s)
+    mover.seed(arm_state(Q_START, tcp_m=START))
+    q = KINEMATICS.solve(tcp_m, Q_START)
+    state = msgspec.structs.replace(arm_state(q, tcp_m=tcp_m), qd_rad_s=qd_rad_s)
+    mover.begin_step(go(angle=math.pi / 2), state, duration_s=0.05)
+    assert "leash" in mover.limiters
+    return mover.target_m
+
+
+def speeds(before_m, after_m, duration_s):
+    """Return the joint speeds that bring the tool from one place to the other meanwhile."""
+    before, after = (KINEMATICS.solve(p, Q_START) for p in (before_m, after_m))
+    return tuple((b - a) / duration_s for a, b in zip(before, after, strict=True))
+
+
+def test_a_moving_tool_that_is_behind_by_the_shorter_tick_is_leashed_as_with_the_longer_one():
+    there = (START[0] + 0.01, START[1] - 0.08, START[2])
+    behind = (there[0] - 0.001, there[1] - 0.0035, there[2])
+    ahead_s = DT - FAST_DT
+    expected = leashed(there, tick_s=DT)
+    found = leashed(behind, tick_s=FAST_DT, qd_rad_s=speeds(behind, there, ahead_s))
+    assert found == pytest.approx(expected, abs=2e-5)
+    assert math.dist(leashed(behind, tick_s=FAST_DT), expected) > 2e-3
+
+
+def test_a_tool_at_rest_is_leashed_where_it_is_whatever_the_tick():
+    there = (START[0] + 0.01, START[1] - 0.08, START[2])
+    assert leashed(there, tick_s=FAST_DT) == pytest.approx(leashed(there, tick_s=DT), abs=1e-9)
+    assert math.dist(leashed(there, tick_s=FAST_DT), there) == pytest.approx(LEASH_M, abs=1e-9)
+
+
+@pytest.mark.parametrize("qd_rad_s", [100.0, -100.0, 1e9, math.nan])
+def test_no_reading_of_joint_speeds_lengthens_the_leash_by_more_than_the_tool_could_have_gone(qd_rad_s):
+    there = (START[0] + 0.01, START[1] - 0.08, START[2])
+    most_m = math.sqrt(3.0) * (DT - FAST_DT) * ARM.motion.speed_m_s
+    found = leashed(there, tick_s=FAST_DT, qd_rad_s=(qd_rad_s,) * 6)
+    assert math.dist(found, there) <= LEASH_M + most_m + 1e-9

@@ -47,7 +47,7 @@ class Served:
             when_latched=lambda verdict: self.server.latched(verdict),
         )  # fmt: skip
         self.server = ServoServer(
-            connection=theirs, plant=self.plant, loop=loop, tool=rig.arm.tool, pulse=self.pulse, die=self.die
+            connection=theirs, plant=self.plant, loop=loop, arm=rig.arm, pulse=self.pulse, die=self.die
         )
         self.thread = Thread(target=self.run)
         self.thread.start()
