@@ -82,7 +82,7 @@ class ContactGuard:
         x, y, z = target_m
         is_pushed_up = fz > self._force_n and min(z, commanded_m[2]) < measured_m[2] - _TINY
         if is_pushed_up:
-            z = measured_m[2]
+            z = max(z, measured_m[2])  # a tool that was told to rise is not held down by what it still presses on
         is_pushed_back = math.hypot(fx, fy) > self._force_n
         if is_pushed_back and self._was_pushed_back and (x - measured_m[0]) * fx + (y - measured_m[1]) * fy < 0.0:
             x, y = measured_m[0], measured_m[1]

@@ -35,6 +35,11 @@ def test_a_command_that_runs_ahead_of_the_tool_falls_back_while_it_is_pushed(gua
     assert guard.reseat((0.0, 0.0, LIMIT + 1.0), TOOL, TOOL, TOOL) is None
 
 
+def test_a_tool_that_was_told_to_rise_is_not_held_down_by_what_it_still_presses_on(guard):
+    above = (0.4, 0.0, 0.12)
+    assert guard.reseat((0.0, 0.0, LIMIT + 1.0), TOOL, BELOW, above) == above
+
+
 def test_held_up_a_step_down_is_only_a_probe(guard):
     guard.reseat((0.0, 0.0, LIMIT + 1.0), TOOL, TOOL, BELOW)
     eased, is_eased = guard.ease(TOOL, (0.4, 0.0, 0.08))
