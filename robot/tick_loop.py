@@ -25,6 +25,7 @@ class Stride(msgspec.Struct, frozen=True, kw_only=True):
     """What one time step of the loop came to."""
 
     before: ArmState
+    """At the end of the one before: the arm may have gone on meanwhile."""
     after: ArmState
     is_begun: bool
     """The gate admitted the intent; otherwise no time has passed."""
@@ -137,7 +138,7 @@ class TickLoop:
 
     def begin(self, intent: Intent, *, n_ticks: int, wait_at_m: Vec3 | None = None) -> Verdict | None:
         """Begin to carry out an intent; ticks do the rest. Returns the gate's refusal, if it refused."""
-        before = self._before = self.state
+        before = self.state
         verdict = self._gate.admit(intent, now_ns=self._arm.clock.now_ns())
         if verdict is not None:
             return verdict
@@ -184,10 +185,10 @@ class TickLoop:
         return self.state
 
     def report(self, verdict: Verdict | None, *, is_begun: bool) -> Stride:
-        """Return what the time step that was begun last came to."""
-        mover = self._mover
+        """Return what the time step that was begun last came to, and what it did on its way from the one before."""
+        mover, before, self._before = self._mover, self._before, self.state
         return Stride(
-            before=self._before, after=self.state, is_begun=is_begun, target_m=mover.target_m, limiters=mover.limiters,
+            before=before, after=self.state, is_begun=is_begun, target_m=mover.target_m, limiters=mover.limiters,
             is_in_contact=mover.is_in_contact, verdict=verdict,
         )  # fmt: skip
 

@@ -88,5 +88,5 @@ class ContactGuard:
             x, y = measured_m[0], measured_m[1]
         self._was_pushed_back = is_pushed_back
         if is_pushed_up and self._held is None:
-            self._held = (x, y, z)
+            self._held = (x, y, measured_m[2])
         return (x, y, z) if is_pushed_up or (x, y, z) != target_m else None

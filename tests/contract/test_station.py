@@ -156,15 +156,13 @@ def test_a_step_takes_its_time_and_says_what_it_did(world, engaged, resolved):
     assert moved @ (math.cos(0.5), math.sin(0.5), 0.0) > 0.03
 
 
-def test_the_parts_of_a_path_add_up_and_it_rests_on_the_target(world, engaged):
-    station, arm, _ = engaged
-    start = np.array(arm.read().tcp_position_m)
+def test_the_parts_of_a_path_add_up_and_it_rests_on_the_target(engaged):
+    station, _, _ = engaged
+    start = np.array(station.step(go(distance=0.0)).percept.tcp_position_m)
     results = [station.step(go(angle=1.0)) for _ in range(5)] + [station.step(go(distance=0.0)) for _ in range(15)]
     total = start + np.sum([r.executed.moved_m for r in results], axis=0)
     last = results[-1]
-    # Between two steps a wall's clock runs on, and so does the arm, towards its rest.
-    within_m = 1e-9 if world.is_lock_step else 0.015
-    assert total == pytest.approx(last.percept.tcp_position_m, abs=within_m)
+    assert total == pytest.approx(last.percept.tcp_position_m, abs=1e-9)
     assert last.percept.tcp_position_m == pytest.approx(last.executed.target_m, abs=1e-3)
 
 

@@ -35,16 +35,8 @@ def test_the_tool_takes_the_lock_step_twins_path_over_the_wire(pair):
     check(pair, Kind.DESCENT, seed=7)
 
 
-HELD = pytest.mark.xfail(
-    reason="in lock-step the force guard holds the tool on this button for 250 ms after it was told to rise"
-)
-ERRANDS = [
-    *((kind, seed) for kind in Kind for seed in range(10, 14) if (kind, seed) != (Kind.PRESS, 12)),
-    pytest.param(Kind.PRESS, 12, marks=HELD),
-]
-
-
 @pytest.mark.slow
-@pytest.mark.parametrize(("kind", "seed"), ERRANDS)
+@pytest.mark.parametrize("kind", list(Kind))
+@pytest.mark.parametrize("seed", range(10, 14))
 def test_every_errand_takes_the_lock_step_twins_path(pair, kind, seed):
     check(pair, kind, seed)
