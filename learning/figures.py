@@ -132,7 +132,7 @@ def _draw_trials(axes: Axes, group: Group) -> None:
     axes.set_ylim(0.6, manifest.n_trials + 0.3)
     axes.yaxis.set_major_locator(MaxNLocator(integer=True))
     axes.set_xlabel("epochs")
-    axes.text(1.0, 1.0, "grey: optimum", transform=axes.transAxes, ha="right", va="top", color=GREY, fontsize=7.5)
+    axes.text(1.0, 1.01, "grey: optimum", transform=axes.transAxes, ha="right", va="bottom", color=GREY, fontsize=7.5)
 
 
 def _draw_lines(axes: Axes, group: Group, figure_of: Callable[[EvaluationRow], float | None]) -> None:
