@@ -187,6 +187,9 @@ def check_scenario(scenario: Scenario, file: str) -> None:
         checker.need(is_high, f"buttons[{i}].height_m", f"at least {least_m:g}, cap and travel", f"{button.height_m:g}")
     for i, goal in enumerate(scenario.goals):
         _check_goal(goal, scenario, f"goals[{i}]", checker)
+    if scenario.workspace_m is not None:
+        for axis, pair in enumerate(zip(*scenario.workspace_m, strict=True)):
+            checker.ascending(pair, f"workspace_m[1][{axis}]")
     starts = [span.from_epoch for span in scenario.schedule]
     checker.need(starts[0] == 0, "schedule[0].from_epoch", "0, the first epoch", f"{starts[0]}")
     for i in range(1, len(starts)):

@@ -164,6 +164,7 @@ def load_resolved(path: Path) -> Resolved:
     check_scenario(resolved.scenario, files.scenario)
     check_placing(resolved.scenario, files.scenario)
     _check_rule_sets(resolved.scenario, resolved.rule_sets, files.scenario, files.rule_sets)
+    resolved = msgspec.structs.replace(resolved, arm=fenced(resolved.arm, resolved.scenario, files.scenario))
     _check_together(resolved, files)
     return resolved
 

@@ -13,7 +13,7 @@ def fenced(arm: ArmConfig, scenario: Scenario, file: str) -> ArmConfig:
     """Return the arm with its workspace cut to the scenario's, base frame; the same arm where that names none.
 
     Raises:
-        ConfigError: the scenario's workspace is inside out or reaches beyond the arm's.
+        ConfigError: the scenario's workspace reaches beyond the arm's.
     """
     if scenario.workspace_m is None:
         return arm
@@ -24,8 +24,5 @@ def fenced(arm: ArmConfig, scenario: Scenario, file: str) -> ArmConfig:
             if not least <= at <= most:
                 expected = f"within the arm's workspace, {least:g} to {most:g}"
                 raise ConfigError(file, f"workspace_m[{corner}][{axis}]", expected, f"{at:g}")
-        if low[axis] >= high[axis]:
-            got = f"{low[axis]:g} and {high[axis]:g}"
-            raise ConfigError(file, f"workspace_m[1][{axis}]", "the lesser value first", got)
     motion = msgspec.structs.replace(arm.motion, workspace_m=scenario.workspace_m)
     return msgspec.structs.replace(arm, motion=motion)

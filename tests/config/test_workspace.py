@@ -2,7 +2,8 @@ import msgspec
 import pytest
 
 from config.errors import ConfigError
-from config.loader import load_arm, load_scenario, resolve, with_rig
+from config.loader import load_arm, load_resolved, load_scenario, resolve, with_rig
+from config.resolved import dump_resolved
 from config.workspace import fenced
 
 ARM = load_arm("ur5e")
@@ -35,7 +36,7 @@ def test_a_workspace_beyond_the_arms_is_refused(axis):
         assert caught.value.where == f"workspace_m[{corner}][{axis}]"
 
 
-def test_a_workspace_inside_out_is_refused():
-    with pytest.raises(ConfigError, match="lesser value first") as caught:
-        fenced(ARM, scenario(HIGH, LOW), "file")
-    assert caught.value.where == "workspace_m[1][0]"
+def test_a_resolved_files_arm_is_held_to_its_tables_workspace_too(tmp_path):
+    resolved = resolve(scenario="paper")
+    (tmp_path / "wide.yaml").write_text(dump_resolved(msgspec.structs.replace(resolved, arm=ARM)))
+    assert load_resolved(tmp_path / "wide.yaml") == resolved
