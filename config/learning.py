@@ -41,7 +41,7 @@ class GoalSelection(Section, frozen=True, kw_only=True):
     probability_floor: Share = 0.0
     """Least total probability spread over all goals whatever their values, so that none is lost sight of."""
     floor_by_failure: Share = 0.0
-    """Part of the floor that is spread by how often goals fail, the rest evenly: what no attempt improves yet has no
+    """Part of the floor that is spread by how often epochs fail, the rest evenly: what no attempt improves yet has no
     value, and would be left alone with what is mastered."""
     rearm: bool = False
     """Raise a goal's value again when what it was believed to need has changed or it begins to fail."""

@@ -65,11 +65,17 @@ def most_hopeful_step(
     """
     best, best_value = goal, 0.0
     for steps, here in random_walks(start, graph, n_walks=n_walks, length=length, rng=rng):
+        first = _hope(steps[0], start, graph, failures) if steps else 1.0
         chance = graph.beliefs[goal].predict_success(here) * graph.freedom(goal, here)
-        value = chance / (len(steps) + 1) / (1.0 + failures.get((goal, here), 0.0))
+        value = first * chance / (len(steps) + 1) / (1.0 + failures.get((goal, here), 0.0))
         if value > best_value and not (steps and goal in steps):
             best, best_value = steps[0] if steps else goal, value
     return best
+
+
+def _hope(step: int, here: Situation, graph: Graph, failures: Mapping[Spot, float]) -> float:
+    """Return how hopeful the first step of a way is: less where it just failed, or where what holds keeps it away."""
+    return graph.freedom(step, here) / (1.0 + failures.get((step, here), 0.0))
 
 
 class Curiosity:

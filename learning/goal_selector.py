@@ -46,6 +46,8 @@ class GoalSelector:
         n_kept = max(2 * config.window, subgoals.competence_window)
         self._cp = [deque[float](maxlen=n_kept) for _ in range(n_goals)]
         self._results = [deque[float](maxlen=n_kept) for _ in range(n_goals)]
+        self._epochs = [deque[float](maxlen=config.window) for _ in range(n_goals)]
+        """What came of the newest epochs that had a goal."""
 
     # ----------------------------------------------------------------------------------------------------- decide
 
@@ -56,7 +58,7 @@ class GoalSelector:
     def probabilities(self) -> np.ndarray:
         """Return each goal's chance of being chosen next.  () -> (n,)"""
         floor, by_failure = self._config.probability_floor, self._config.floor_by_failure
-        failing = np.array([FAILING + 1.0 - self.success(goal) for goal in range(len(self._values))])  # (n,)
+        failing = np.array([FAILING + 1.0 - self.epoch_success(goal) for goal in range(len(self._values))])  # (n,)
         spread = by_failure * failing / failing.sum() + (1.0 - by_failure) / len(failing)
         return (1.0 - floor) * softmax(self._values, self._config.temperature) + floor * spread
 
@@ -74,6 +76,7 @@ class GoalSelector:
 
     def end_epoch(self, goal: int, *, predicted: float, is_achieved: bool) -> None:
         """Learn from one epoch that was not void; predicted is the chance of its goal said at the epoch's start."""
+        self._epochs[goal].append(float(is_achieved))
         if self._config.credit == "main_goal":
             self._credit(goal, predicted=predicted, is_achieved=is_achieved)
 
@@ -109,6 +112,10 @@ class GoalSelector:
         """Return the running success of a goal."""
         return running_success(list(self._results[goal]), self._subgoals.competence_window)
 
+    def epoch_success(self, goal: int) -> float:
+        """Return the share of a goal's newest epochs in which it was achieved."""
+        return running_success(list(self._epochs[goal]), self._config.window)
+
     @property
     def values(self) -> tuple[float, ...]:
         """Each goal's value."""
@@ -120,13 +127,15 @@ class GoalSelector:
             "values": self._values.copy(),
             "cp": [list(kept) for kept in self._cp],
             "results": [list(kept) for kept in self._results],
+            "epochs": [list(kept) for kept in self._epochs],
             "rng": self._rng.bit_generator.state,
         }
 
     def load_state_dict(self, state: dict[str, Any]) -> None:
         """Restore bit for bit."""
         self._values = np.array(state["values"], dtype=float)
-        for kept, loaded in zip((*self._cp, *self._results), (*state["cp"], *state["results"]), strict=True):
+        kept_before = (*state["cp"], *state["results"], *state["epochs"])
+        for kept, loaded in zip((*self._cp, *self._results, *self._epochs), kept_before, strict=True):
             kept.clear()
             kept.extend(loaded)
         self._rng.bit_generator.state = state["rng"]

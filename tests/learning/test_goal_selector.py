@@ -83,10 +83,13 @@ def test_the_floor_keeps_every_goal_in_sight():
     assert p.sum() == pytest.approx(1.0)
 
 
-def test_a_part_of_the_floor_goes_where_attempts_fail():
+def test_a_part_of_the_floor_goes_where_epochs_fail():
     bandit = selector(window=2, improvement="clipped_success", probability_floor=0.6, floor_by_failure=0.5)
-    for goal, results in enumerate(([1] * 20, [1] * 20, [0] * 20)):
-        feed(bandit, goal, results)
+    for goal, is_achieved in enumerate((True, True, False)):
+        for _ in range(3):
+            bandit.end_epoch(goal, predicted=0.5, is_achieved=is_achieved)
+    # A goal tried in vain on the way to another does not fail by that.
+    feed(bandit, 0, [0] * 20)
     p = bandit.probabilities()
     # Values are all 0, so the free part is even; failing rates are 0.05, 0.05 and 1.05 of 1.15.
     even, by_failure = 0.4 / 3 + 0.3 / 3, 0.3 * np.array([0.05, 0.05, 1.05]) / 1.15

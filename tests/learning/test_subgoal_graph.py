@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from config.learning import SubgoalSelection
+from learning.curiosity import most_hopeful_step
 from learning.graph import Graph
 from learning.interfaces import Attempt, TrialOutcome
 from learning.preconditions import START, Needs, Situation, conjunctions
@@ -126,6 +127,14 @@ def test_where_it_is_unknown_what_a_goal_needs_the_same_is_not_tried_all_epoch_l
         selector.update(trial(step, outcome=BLOCKED, epoch=40))
         tried.append(step)
     assert len(set(tried)) > 1
+
+
+def test_a_way_begins_with_what_has_not_just_failed_there():
+    g = graph()
+    failures = {(3, START): 5.0, (1, START): 5.0}
+    rng = np.random.default_rng(0)
+    steps = [most_hopeful_step(3, START, g, n_walks=20, length=3, rng=rng, failures=failures) for _ in range(20)]
+    assert set(steps) == {0, 2}
 
 
 def test_a_probe_never_ends_the_epoch_before_what_it_is_for():
