@@ -2,6 +2,7 @@
 
 Whoever resets the table of a cell also looks after an arm that has stopped: a protective stop is unlocked, when five
 seconds have passed since, and the program that it interrupted is ended, before the table is laid out. Other stops stay.
+A reset waits a second for a program that is ending and an arm that is coming to rest.
 """
 
 import msgspec
@@ -10,7 +11,6 @@ import zenoh
 from robot.bus import CELL, RESET, TRUTH, CellAction, ResetRequest, open_session, topic
 from robot.messages import SceneState
 from sim_twin.controller.robot import VirtualRobot
-from sim_twin.controller.states import RuntimeState
 from sim_twin.controller.table_hands import TableHands
 from sim_twin.controller.wire.dashboard_target import Outcome
 from sim_twin.plant import TwinTruth
@@ -20,7 +20,7 @@ __all__ = ["BusPort"]
 TRUTH_SLICES = 5
 N_WAITING = 8
 PATIENCE_SLICES = 500
-"""How long a program may take to end after it was stopped at the pendant."""
+"""How long a program may take to end, and the arm to come to rest, once a reset was asked for."""
 
 
 class BusPort:
@@ -49,13 +49,19 @@ class BusPort:
         self._hands = TableHands(robot.machine.world)
         self._n_patience = 0
         self._asked: zenoh.Query | None = None
-        """A reset that waits for the arm to be unlocked."""
+        """A reset that waits for the arm to be unlocked, or to come to rest."""
         self._encode = msgspec.json.Encoder().encode
+
+    @property
+    def is_waiting(self) -> bool:
+        """Whether a reset was asked for that is not answered yet."""
+        return self._asked is not None
 
     def tick(self, n_slices: int) -> None:
         """Answer what was asked, and publish when it is time."""
-        query = self._asked or self._queries.try_recv()
-        self._asked = None
+        query, self._asked = self._asked, None
+        if query is None:
+            query, self._n_patience = self._queries.try_recv(), PATIENCE_SLICES
         if query is not None:
             self._answer(query)
         action = self._actions.try_recv()
@@ -79,11 +85,10 @@ class BusPort:
                 return
             robot.panel.stop()
             self._n_patience = PATIENCE_SLICES
-        if self._n_patience and modes.runtime is not RuntimeState.STOPPED:
+        if self._n_patience and not robot.is_idle:
             self._asked = query
             self._n_patience -= 1
             return
-        self._n_patience = 0
         with query:
             try:
                 asked = msgspec.json.decode(_payload(query), type=ResetRequest)

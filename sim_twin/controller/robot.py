@@ -112,6 +112,11 @@ class VirtualRobot:
         machine.io.digital_in = self.box.sense(machine.world.table.read_inputs()) | self.forced_inputs
         self.hand.tick()
 
+    @property
+    def is_idle(self) -> bool:
+        """Whether no program runs and the arm is at rest."""
+        return self.machine.modes.runtime is RuntimeState.STOPPED and self.machine.drive.is_standing
+
     def lay_out(self, *, seed: int, epoch: int, digital_out: int) -> None:
         """Draw and place the table, the arm at its start, lids as the outputs say, the hand open (a reset).
 
@@ -119,7 +124,7 @@ class VirtualRobot:
             ValueError: a program runs, or the arm is under way: it would go on from somewhere else.
         """
         machine, drive = self.machine, self.machine.drive
-        if machine.modes.runtime is not RuntimeState.STOPPED or not drive.is_standing:
+        if not self.is_idle:
             raise ValueError("expected no program and an arm at rest; stop the program first")
         world = machine.world
         layout = draw_layout(world.scenario, np.random.default_rng([seed, epoch]))

@@ -1,0 +1,105 @@
+"""Resets over the bus, slice by slice: who asks may find a program that is just ending."""
+
+import socket
+import time
+from queue import SimpleQueue
+
+import msgspec
+import numpy as np
+import pytest
+
+from robot.bus import RESET, ResetRequest, open_session, topic
+from sim_twin.controller.bus_port import PATIENCE_SLICES, BusPort
+from sim_twin.controller.states import RuntimeState
+from tests.support.virtual_robot import make_robot, run
+
+MOVES = "def f():\n q = get_actual_joint_positions()\n q[0] = q[0] + 0.2\n movej(q, a=8, v=2)\nend\n"
+FOREVER = "def waits():\n  while True:\n    sync()\n  end\nend\n"
+SLICES_AT_MOST = 1500
+
+
+class Cell:
+    """A robot, its port, and somebody who asks for a reset."""
+
+    def __init__(self, endpoint):
+        self.robot = make_robot()
+        self.port = BusPort(self.robot, endpoint)
+        self.asker = open_session(endpoint, is_hub=False)
+        self.key = topic(self.robot.panel.status().serial_number, RESET)
+        self.n = 0
+
+    def start(self, text):
+        self.robot.submit_script(text)
+        run(self.robot, 50, lambda: self.runtime is RuntimeState.PLAYING)
+
+    @property
+    def runtime(self):
+        return self.robot.machine.modes.runtime
+
+    def ask(self):
+        """Ask, and let slices pass once the port has the question; return what came and after how many slices."""
+        replies = SimpleQueue()
+        payload = msgspec.json.encode(ResetRequest(seed=3, epoch=1, digital_out=0))
+        self.asker.get(self.key, replies.put, payload=payload, timeout=20.0)
+        end = time.monotonic() + 10.0
+        while not self.port.is_waiting and replies.empty():
+            assert time.monotonic() < end
+            self.port.tick(1)
+        for n in range(SLICES_AT_MOST):
+            if not self.port.is_waiting:
+                return replies.get(timeout=10.0), n
+            self.robot.step()
+            self.port.tick(n)
+        raise AssertionError("a reset is not waited for without end")
+
+    def close(self):
+        self.asker.close()
+        self.port.close()
+        self.robot.close()
+
+
+@pytest.fixture
+def cell():
+    with socket.create_server(("127.0.0.66", 0)) as free:
+        endpoint = f"tcp/127.0.0.66:{free.getsockname()[1]}"
+    made = Cell(endpoint)
+    yield made
+    made.close()
+
+
+def joints(robot):
+    return robot.machine.world.data.qpos[:6].copy()
+
+
+def test_a_reset_at_rest_is_done_at_once(cell):
+    before = joints(cell.robot)
+    reply, n = cell.ask()
+    assert reply.ok is not None
+    assert n == 0
+    assert np.abs(joints(cell.robot) - before).max() > 0.01
+
+
+def test_a_reset_waits_for_a_program_that_is_ending_and_an_arm_that_comes_to_rest(cell):
+    cell.start(MOVES)
+    run(cell.robot, 20)
+    assert not cell.robot.is_idle
+    reply, n = cell.ask()
+    assert reply.ok is not None
+    assert 20 < n < PATIENCE_SLICES
+    assert cell.robot.is_idle
+
+
+def test_a_reset_does_not_outwait_a_program_that_goes_on_and_leaves_it_alone(cell):
+    cell.start(FOREVER)
+    before = joints(cell.robot)
+    reply, n = cell.ask()
+    assert reply.err is not None
+    assert "stop the program first" in reply.err.payload.to_string()
+    assert n == PATIENCE_SLICES
+    assert cell.runtime is RuntimeState.PLAYING
+    assert np.abs(joints(cell.robot) - before).max() < 1e-3
+
+
+def test_each_reset_has_its_own_patience(cell):
+    cell.start(FOREVER)
+    assert [cell.ask()[1] for _ in range(2)] == [PATIENCE_SLICES] * 2
