@@ -9,6 +9,7 @@ from robot.messages import ArmState, Heading, Intent, JointTarget, Twist, Vec3, 
 from robot.motion.contact import ContactGuard
 from robot.motion.follower import Follower
 from robot.motion.target import MAX_TURN_RAD, Shaped, TargetLimits, advance_heading, advance_twist, fence
+from robot.motion.trail import Trail
 
 __all__ = ["Mover"]
 
@@ -16,9 +17,8 @@ JOINT_STEP_RAD = 0.35
 """Greatest change of any joint's target in one step."""
 FENCE_MARGIN_M = 1e-4
 """How far inside a fence a command comes to rest that a push would carry past it."""
-LEASH_TICK_S = 0.01
-"""The leash is held where the tool would be with ticks of this length, the twin's. A set-point is for the end of its
-tick, so that with shorter ticks the tool is behind by the difference: a leash held there would cut other corners."""
+STRAY_M = 0.03
+"""A tool this far from where its commands should have brought it is held up: the leash is held at the tool then."""
 RESEAT_SHARE = 0.9
 """Share of a joint's greatest speed at which commands fall back to the measured joints on contact."""
 
@@ -30,8 +30,7 @@ class Mover:
         self._limits = TargetLimits.of(arm, table_m)
         self._follower = Follower(arm, tick_s=tick_s)
         self._contact = ContactGuard(arm)
-        self._ahead_s = max(0.0, LEASH_TICK_S - tick_s)
-        self._ahead_m = self._ahead_s * arm.motion.speed_m_s
+        self._trail = Trail(arm.servo, tick_s=tick_s, q_rad=self._follower.q_rad)
         self._ranges = tuple(j.range_rad for j in arm.joints)
         self._fall_back_rad = tuple(RESEAT_SHARE * j.speed_rad_s * tick_s for j in arm.joints)
         self._limiters: list[str] = []
@@ -54,6 +53,7 @@ class Mover:
     def seed(self, state: ArmState) -> None:
         """Rest at the measured joints and forget everything before."""
         self._follower.seed(state.q_rad)
+        self._trail.seed(state.q_rad)
         self._contact.reset()
         self._limiters = []
 
@@ -102,6 +102,7 @@ class Mover:
                 self._limiters.append("contact")
                 return self._give_way(moved, state)
         q = follower.step()
+        self._trail.add(q)
         if follower.trouble is not None:
             self._limiters.append(follower.trouble)
         return q
@@ -113,6 +114,7 @@ class Mover:
         if not self._is_inside(back):
             back = self._back_inside(state.tcp_position_m)
         follower.seed(back)
+        self._trail.seed(back)
         follower.aim(fence(target_m, state.tcp_position_m, self._limits).position_m, yaw)
         return back
 
@@ -170,17 +172,9 @@ class Mover:
         follower.aim_joints(q)
 
     def _leashed_to_m(self, state: ArmState) -> Vec3:
-        """Return where the leash is held: at the tool, brought on by its joints' speeds as far as the tool may go."""
-        if self._ahead_s == 0.0:
-            return state.tcp_position_m
-        here, there = (
-            self._follower.tcp(_along(state.q_rad, state.qd_rad_s, seconds)) for seconds in (0.0, self._ahead_s)
-        )
-        x, y, z = (
-            p + max(-self._ahead_m, min(self._ahead_m, b - a))
-            for p, a, b in zip(state.tcp_position_m, here, there, strict=True)
-        )
-        return x, y, z
+        """Return where the leash is held: where a free tool is by now, or at the tool where something keeps it away."""
+        free_m = self._follower.tcp(self._trail.q_rad)
+        return free_m if math.dist(free_m, state.tcp_position_m) < STRAY_M else state.tcp_position_m
 
     def _back_to(self, measured_rad: Vec6) -> Vec6:
         """Return the command brought back to joints, the measured ones, as far as one tick allows."""

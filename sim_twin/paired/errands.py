@@ -19,6 +19,8 @@ DESCENT_M = 0.06
 N_PLACES, NEAR_M, FAR_M = 3, 0.1, 0.25
 N_DRAWN = 200
 REST_STEPS = 4
+END_STEPS = 10
+"""Time steps at an errand's end in which the arm comes to rest on either side: what is cut off is no distance."""
 RISE_STEPS = 12
 Planar = tuple[float, float]
 
@@ -84,7 +86,7 @@ def drive_errand(station: Station, *, kind: Kind, seed: int, epoch: int) -> Erra
     percept = pilot.reset(seed=seed, epoch=epoch)
     rng = np.random.default_rng([seed, epoch])
     _DRIVES[kind](pilot, percept, station.spec, rng)
-    pilot.rest(REST_STEPS)
+    pilot.rest(END_STEPS)
     return Errand(kind=kind, seed=seed, epoch=epoch, intents=tuple(noting.intents))
 
 

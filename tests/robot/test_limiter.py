@@ -74,3 +74,18 @@ def test_what_ruckig_refuses_becomes_a_bounded_stop():
     limiter.aim([0.0, 0.0])
     assert run(limiter, 600)[-1] == pytest.approx([0.0, 0.0], abs=1e-9)
     assert not limiter.is_failed
+
+
+def test_an_axis_about_to_reach_its_greatest_speed_is_not_slowed_by_a_target_further_off():
+    # Seen over the wire: planned anew exactly as it would reach that speed, an axis slowed down for 60 ms.
+    dt, rng, n_reaching = 0.002, np.random.default_rng(0), 0
+    limits = AxisLimits(speed=(0.5, 0.5), acceleration=(3.0, 3.0), jerk=(100.0, 100.0))
+    for _ in range(100):
+        limiter = Limiter(limits, tick_s=dt)
+        for _ in range(8):
+            before = limiter.speed[0]
+            limiter.aim([limiter.at[0] + 0.09, 0.0])
+            run(limiter, int(rng.integers(5, 20)))
+            n_reaching += 0.45 < before < 0.5 - 1e-6
+            assert limiter.speed[0] >= before - 1e-9
+    assert n_reaching > 30

@@ -1,6 +1,5 @@
 import math
 
-import msgspec
 import numpy as np
 import pytest
 
@@ -8,6 +7,7 @@ from config.loader import load_arm
 from robot.kinematics import Kinematics
 from robot.messages import Heading, Hold, JointTarget, Twist
 from robot.motion import Mover
+from robot.servo import lag_s
 from tests.support.stations import arm_state
 
 ARM = load_arm("ur5e")
@@ -221,42 +221,52 @@ def test_a_command_held_down_at_a_fence_comes_up_to_the_tool(arm, beyond_m):
 FAST_DT, LEASH_M = 0.002, ARM.motion.leash_m
 
 
-def leashed(tcp_m, *, tick_s, qd_rad_s=(0.0,) * 6):
-    """Return where the target is after a step towards +y with the measured tool far behind it."""
+class Following:
+    """An arm whose tool trails its commands by a time, on a way that turns back at full speed."""
+
+    def __init__(self, *, tick_s, late_s=0.0):
+        self.mover = Mover(ARM, table_m=0.0, tick_s=tick_s)
+        self.mover.seed(arm_state(Q_START, tcp_m=START))
+        servo = ARM.servo
+        lag = lag_s(lookahead_s=servo.lookahead_s, gain=servo.gain, dead_time_s=servo.dead_time_s)
+        self.n_ticks = round(0.05 / tick_s)
+        self.commands = [Q_START] * (round((lag + late_s) / tick_s) + 1)
+        self.limiters = set()
+
+    @property
+    def state(self):
+        return arm_state(self.commands[0], tcp_m=KINEMATICS.tcp(self.commands[0]))
+
+    def step(self, angle):
+        self.mover.begin_step(go(angle=angle), self.state, duration_s=0.05)
+        self.limiters.update(self.mover.limiters)
+        for _ in range(self.n_ticks):
+            self.commands = [*self.commands[1:], self.mover.tick(self.state)]
+        return self.mover.target_m
+
+    def turn_back(self):
+        return [self.step(angle) for angle in [math.pi / 2] * 6 + [-math.pi / 2] * 6]
+
+
+@pytest.mark.parametrize("late_s", [0.004, 0.01])
+def test_the_leash_bends_no_way_by_how_late_a_measurement_is(late_s):
+    expected, late = Following(tick_s=FAST_DT), Following(tick_s=FAST_DT, late_s=late_s)
+    assert late.turn_back() == expected.turn_back()
+    assert "leash" in expected.limiters
+
+
+def test_the_leash_bends_no_way_by_how_long_a_tick_is():
+    lock_step, wire = Following(tick_s=DT), Following(tick_s=FAST_DT)
+    for one, other in zip(lock_step.turn_back(), wire.turn_back(), strict=True):
+        assert math.dist(one, other) < 5e-4
+    assert "leash" in lock_step.limiters
+
+
+@pytest.mark.parametrize("tick_s", [DT, FAST_DT])
+def test_a_tool_that_is_kept_far_from_where_its_commands_lead_is_leashed_where_it_is(tick_s):
     mover = Mover(ARM, table_m=0.0, tick_s=tick_s)
     mover.seed(arm_state(Q_START, tcp_m=START))
-    q = KINEMATICS.solve(tcp_m, Q_START)
-    state = msgspec.structs.replace(arm_state(q, tcp_m=tcp_m), qd_rad_s=qd_rad_s)
-    mover.begin_step(go(angle=math.pi / 2), state, duration_s=0.05)
+    there = (START[0] + 0.01, START[1] - 0.08, START[2])
+    mover.begin_step(go(angle=math.pi / 2), arm_state(KINEMATICS.solve(there, Q_START), tcp_m=there), duration_s=0.05)
     assert "leash" in mover.limiters
-    return mover.target_m
-
-
-def speeds(before_m, after_m, duration_s):
-    """Return the joint speeds that bring the tool from one place to the other meanwhile."""
-    before, after = (KINEMATICS.solve(p, Q_START) for p in (before_m, after_m))
-    return tuple((b - a) / duration_s for a, b in zip(before, after, strict=True))
-
-
-def test_a_moving_tool_that_is_behind_by_the_shorter_tick_is_leashed_as_with_the_longer_one():
-    there = (START[0] + 0.01, START[1] - 0.08, START[2])
-    behind = (there[0] - 0.001, there[1] - 0.0035, there[2])
-    ahead_s = DT - FAST_DT
-    expected = leashed(there, tick_s=DT)
-    found = leashed(behind, tick_s=FAST_DT, qd_rad_s=speeds(behind, there, ahead_s))
-    assert found == pytest.approx(expected, abs=2e-5)
-    assert math.dist(leashed(behind, tick_s=FAST_DT), expected) > 2e-3
-
-
-def test_a_tool_at_rest_is_leashed_where_it_is_whatever_the_tick():
-    there = (START[0] + 0.01, START[1] - 0.08, START[2])
-    assert leashed(there, tick_s=FAST_DT) == pytest.approx(leashed(there, tick_s=DT), abs=1e-9)
-    assert math.dist(leashed(there, tick_s=FAST_DT), there) == pytest.approx(LEASH_M, abs=1e-9)
-
-
-@pytest.mark.parametrize("qd_rad_s", [100.0, -100.0, 1e9, math.nan])
-def test_no_reading_of_joint_speeds_lengthens_the_leash_by_more_than_the_tool_could_have_gone(qd_rad_s):
-    there = (START[0] + 0.01, START[1] - 0.08, START[2])
-    most_m = math.sqrt(3.0) * (DT - FAST_DT) * ARM.motion.speed_m_s
-    found = leashed(there, tick_s=FAST_DT, qd_rad_s=(qd_rad_s,) * 6)
-    assert math.dist(found, there) <= LEASH_M + most_m + 1e-9
+    assert math.dist(mover.target_m, there) == pytest.approx(LEASH_M, abs=1e-9)
