@@ -14,7 +14,7 @@ from learning.consent import Consent
 from learning.ended import Ended
 from learning.errors import LearningError, RunFolderError
 from learning.figures import curriculum_figure, performance_figure, save
-from learning.progress import Progress
+from learning.progress import Progress, Status
 from learning.report import Run, group_runs, load_run, report_of
 from learning.run_folder import RunFolder, run_folders
 from learning.stop_request import StopRequest
@@ -130,8 +130,8 @@ def evaluate(
 
     folder = RunFolder(run)
     goals = [goal.name for goal in folder.manifest().goals]
-    with Console(stderr=True).status(f"testing {len(goals)} goals, {tests} epochs each") as status:
-        rows = assess(folder, n_tests=tests, seed=seed, rules_epoch=rules_epoch, rig=rig, tell=status.update)
+    with Status(f"testing {len(goals)} goals, {tests} epochs each", now_s=perf_counter) as status:
+        rows = assess(folder, n_tests=tests, seed=seed, rules_epoch=rules_epoch, rig=rig, tell=status)
     if json:
         typer.echo(msgspec.json.encode({"goals": goals, "rows": rows}).decode())
     else:

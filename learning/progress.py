@@ -14,7 +14,7 @@ from rich.text import Text
 from learning.agent import EpochRecord
 from learning.rows import EvaluationRow
 
-__all__ = ["Progress", "Rate", "duration_text"]
+__all__ = ["Progress", "Rate", "Status", "duration_text"]
 
 RECENT = 20
 """Epochs of a goal that its recent success is taken over."""
@@ -154,6 +154,32 @@ class Progress:
         for part in (head, bar, table):
             picture.add_row(part)
         return picture
+
+
+class Status:
+    """One sentence that changes: in place on a terminal, elsewhere a line every ten seconds at most."""
+
+    def __init__(self, sentence: str, *, now_s: Callable[[], float], console: Console | None = None) -> None:
+        self._console = console or Console(stderr=True)
+        self._now_s, self._shown_s = now_s, now_s()
+        self._spinner = self._console.status(sentence) if self._console.is_terminal else None
+
+    def __enter__(self) -> Self:
+        if self._spinner is not None:
+            self._spinner.start()
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
+        if self._spinner is not None:
+            self._spinner.stop()
+
+    def __call__(self, sentence: str) -> None:
+        """Tell how far it is."""
+        if self._spinner is not None:
+            self._spinner.update(sentence)
+        elif (now_s := self._now_s()) - self._shown_s >= LINE_EVERY_S:
+            self._shown_s = now_s
+            self._console.print(sentence, highlight=False, soft_wrap=True)
 
 
 def duration_text(seconds: float) -> str:

@@ -7,7 +7,7 @@ import pytest
 from rich.console import Console
 
 from learning.agent import EpochRecord
-from learning.progress import Progress, Rate, duration_text
+from learning.progress import Progress, Rate, Status, duration_text
 from learning.stop_request import StopRequest
 from learning.stopwatch import Stopwatch
 from tests.learning.test_metrics import row
@@ -116,3 +116,14 @@ def test_the_first_signal_asks_for_a_stop_and_the_second_stops_at_once(number):
             signal.raise_signal(number)
     assert len(said) == 1
     assert signal.getsignal(number) is before
+
+
+@pytest.mark.parametrize(("terminal", "n_lines"), [(False, 2), (True, 0)])
+def test_a_status_without_a_terminal_is_a_line_every_ten_seconds(terminal, n_lines):
+    clock, text = Clock(), io.StringIO()
+    with Status("testing", now_s=clock, console=Console(file=text, force_terminal=terminal, width=100)) as status:
+        for n in range(30):
+            clock.now_s += 1.0
+            status(f"{n} test epochs run")
+    told = [line for line in text.getvalue().splitlines() if line in ("9 test epochs run", "19 test epochs run")]
+    assert len(told) == n_lines
