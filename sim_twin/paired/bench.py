@@ -15,6 +15,8 @@ __all__ = ["bench_wire", "path_results"]
 HOST = "127.0.0.34"
 FRECHET_GOAL_MM = 3.0
 N_ERRANDS, N_ALL = 6, 30
+FIRST_SEED = 200
+"""Errands of seeds below 60 were looked into while what bent their paths was found."""
 BUDGET_S, BUDGET_ALL_S = 45.0, 600.0
 """No further errand is begun after so long: a machine that is busy elsewhere disturbs many."""
 N_TESTS, N_ALL_TESTS = 1, 20
@@ -43,7 +45,7 @@ def _measure_paths(pair: Pair, n_errands: int, budget_s: float) -> list[BenchRes
     begun = perf_counter()
     compared: list[Compared] = []
     n_cut_short, kinds = 0, tuple(Kind)
-    for seed in range(n_errands):
+    for seed in range(FIRST_SEED, FIRST_SEED + n_errands):
         if perf_counter() - begun > budget_s:
             break
         try:
