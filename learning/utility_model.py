@@ -31,6 +31,8 @@ FLOOR_STD_M = 0.006
 WINDOW = 20
 """Trials of the running success."""
 LOSS_BEND = 0.1
+RETRAINED = 10
+"""Trials' worth of training with new weights, once a model is past its first successes."""
 
 
 def trace_utilities(n_steps: int, horizon: int) -> Array:
@@ -90,7 +92,12 @@ class UtilityModel:
     @property
     def is_settled(self) -> bool:
         """Whether nearly all the last trials succeeded by the model alone: it is left as it is."""
-        return len(self._clean) >= WINDOW and len(self._clean) - sum(self._clean) <= self._config.settled_misses
+        return len(self._clean) >= WINDOW and self._n_missed <= self._config.settled_misses
+
+    @property
+    def _n_missed(self) -> int:
+        """Trials, of the newest since the weights were told, that did not succeed by the model alone."""
+        return len(self._clean) - sum(self._clean)
 
     @property
     def skill(self) -> float:
@@ -109,17 +116,20 @@ class UtilityModel:
         self._weigh()
 
     def _weigh(self) -> None:
-        """Tell relevance anew while successes are few, then now and then until the model is settled.
+        """Tell relevance anew while successes are few, later now and then where the model fails.
 
-        New weights are a new meaning of every input: a model that works keeps those it was trained with.
+        New weights are a new meaning of every input: a model that works keeps those it was trained with, however seldom
+        it was tried, and one that does not is trained with them at once.
         """
         n = self.n_successes
-        is_due = n <= self._config.relevance_until or (n % WINDOW == 0 and not self.is_settled)
-        if n < FEW_ENDS or not is_due:
+        is_early = n <= self._config.relevance_until
+        if n < FEW_ENDS or not (is_early or (n % WINDOW == 0 and self._n_missed > self._config.settled_misses)):
             return
         self._clean = []
         weights = relevance(np.array(self._ends_m), self._config.relevance_power)
         self.weights[: -self._n_states or None] = np.tile(weights, 1 + len(self._config.scales_m))
+        if not is_early:
+            self._fit(RETRAINED * self._config.updates_per_trial)
 
     def fail(self, trace: Array) -> None:
         """Take in the end of a trace that came to nothing.  (k, n_inputs)"""
@@ -133,12 +143,12 @@ class UtilityModel:
 
     def train(self) -> None:
         """Fit the network a little, more carefully the more it has seen; a settled one is left as it is."""
-        if self._successes.n == 0:
-            return
-        if self.is_settled:
-            return
+        if self._successes.n and not self.is_settled:
+            self._fit(self._config.updates_per_trial)
+
+    def _fit(self, n_updates: int) -> None:
         self._network.learning_rate = self._config.learning_rate / (1.0 + self.n_successes / self._config.rate_half)
-        for _ in range(self._config.updates_per_trial):
+        for _ in range(n_updates):
             self._update()
 
     def _update(self) -> None:
