@@ -173,9 +173,8 @@ class Mover:
         """Return where the leash is held: at the tool, brought on by its joints' speeds as far as the tool may go."""
         if self._ahead_s == 0.0:
             return state.tcp_position_m
-        here, there = (
-            self._follower.tcp(_along(state.q_rad, state.qd_rad_s, seconds)) for seconds in (0.0, self._ahead_s)
-        )
+        here = self._follower.tcp(state.q_rad)
+        there = self._follower.tcp(_along(state.q_rad, state.qd_rad_s, self._ahead_s))
         x, y, z = (
             p + max(-self._ahead_m, min(self._ahead_m, b - a))
             for p, a, b in zip(state.tcp_position_m, here, there, strict=True)
