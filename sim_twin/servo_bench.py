@@ -86,7 +86,11 @@ def _period_rows(blocks: Blocks) -> tuple[BenchResult, ...]:
             name="own_work_p99_us", value=work_us, unit="us", goal=f"<= {OWN_WORK_GOAL_US:g}",
             ok=0.0 < work_us <= OWN_WORK_GOAL_US,
         ),
+        BenchResult(name="own_cpu_p50_us", value=1e6 * blocks.own_cpu.percentile_s(50.0), unit="us"),
         BenchResult(name="own_cpu_p99_us", value=1e6 * blocks.own_cpu.percentile_s(99.0), unit="us"),
+        BenchResult(name="own_intent_cpu_p50_us", value=1e6 * blocks.intent_cpu.percentile_s(50.0), unit="us"),
+        BenchResult(name="own_calm_p99_us", value=1e6 * blocks.calm_work.percentile_s(99.0), unit="us"),
+        BenchResult(name="preempted_tick_share", value=1.0 - blocks.calm_work.n / max(1, work.n), unit="share"),
         BenchResult(
             name="late_tick_share", value=ours.over_share, unit="share", goal=f"<= {LATE_GOAL:g}",
             ok=ours.n > 0 and ours.over_share <= LATE_GOAL,
