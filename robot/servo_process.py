@@ -11,6 +11,7 @@ What latched is told before the arm is stopped, for a stop takes its time. Ctrl-
 decide on: this process is in a group of its own, so that it does not vanish from under an epoch that is to be finished.
 """
 
+import gc
 import os
 import signal
 import sys
@@ -97,6 +98,9 @@ def serve(connection: Connection, resolved_json: bytes, pulse: MutableSequence[i
         pulse=pulse,
         die=lambda: os._exit(LOST_CODE),
     )
+    # What is there by now stays: no collection in the midst of the ticks need look through it again.
+    gc.collect()
+    gc.freeze()
     try:
         server.run()
     except (EOFError, OSError, KeyboardInterrupt):

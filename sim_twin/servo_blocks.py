@@ -1,6 +1,7 @@
 """Blocks of servo ticks against a virtual controller, timed: through this project's loop, and with the client alone."""
 
 import math
+import resource
 from collections.abc import Callable
 from time import perf_counter, thread_time
 
@@ -26,15 +27,17 @@ SWING_RAD, SWING_S = 0.02, 2.0
 class _Listener:
     """Implements robot.hal.protocols.Clock around an arm's: tells of each tick its period and what was not waiting.
 
-    The latter by the wall and by the processor, which leaves out what other processes took.
+    The latter by the wall and by the processor, which leaves out what other processes took; and whether the kernel took
+    the processor away meanwhile.
 
     Attributes:
         is_on: Whether it tells.
     """
 
-    def __init__(self, clock: Clock, tell: Callable[[float, float, float], None]) -> None:
+    def __init__(self, clock: Clock, tell: Callable[[float, float, float, bool], None]) -> None:
         self._clock, self._tell = clock, tell
         self._woke_s = self._woke_cpu_s = 0.0
+        self._n_preempted = 0
         self.is_on = False
 
     def now_ns(self) -> int:
@@ -43,15 +46,18 @@ class _Listener:
 
     def begin(self) -> None:
         """A block begins."""
+        self._n_preempted = _n_preempted()
         self.is_on, self._woke_s, self._woke_cpu_s = True, perf_counter(), thread_time()
 
     def wait_tick(self) -> int:
         """Wait as the arm's clock does."""
         asleep_s, asleep_cpu_s = perf_counter(), thread_time()
+        is_preempted = _n_preempted() > self._n_preempted
         n_missed = self._clock.wait_tick()
         if self.is_on:
             woke_s, woke_cpu_s = perf_counter(), thread_time()
-            self._tell(woke_s - self._woke_s, asleep_s - self._woke_s, asleep_cpu_s - self._woke_cpu_s)
+            self._tell(woke_s - self._woke_s, asleep_s - self._woke_s, asleep_cpu_s - self._woke_cpu_s, is_preempted)
+            self._n_preempted = _n_preempted()
             self._woke_s, self._woke_cpu_s = woke_s, woke_cpu_s
         return n_missed
 
@@ -63,6 +69,8 @@ class Blocks:
         period: From tick to tick through our loop.
         own_work: Of each of those ticks, what was not waiting, less the median call of the client in the block before.
         own_cpu: The same by the processor's time of this thread.
+        calm_work: As own_work, of the ticks from which the kernel did not take the processor.
+        intent_cpu: As own_cpu, of the ticks in which an intent begins.
         bare_period: From tick to tick with the client alone.
         bare_call: What the client's servoJ took there.
         n_stops: Blocks of ours that ended before their time, by a refusal of the gate or a loss of the arm.
@@ -77,6 +85,8 @@ class Blocks:
             resolved: its rig.
         """
         self.period, self.own_work, self.own_cpu = Tally(over_s=LATE_S), Tally(), Tally()
+        self.calm_work, self.intent_cpu = Tally(), Tally()
+        self._is_beginning = False
         self.bare_period, self.bare_call = Tally(over_s=LATE_S), Tally()
         self.n_stops, self.servo_s = 0, 0.0
         self._address, self._resolved = address, resolved
@@ -145,6 +155,7 @@ class Blocks:
         self._listener.begin()
         while (gone_s := perf_counter() - begun_s) < duration_s:
             heading_rad += TURN_RAD
+            self._is_beginning = True
             intent = Heading(heading_rad=heading_rad, distance_m=STEP_M, height_m=HEIGHT_M)
             stride = self._loop.stride(intent, grip, n_ticks=INTENT_TICKS)
             if stride.verdict is not None:
@@ -152,7 +163,17 @@ class Blocks:
         self.servo_s += gone_s
         return True
 
-    def _take(self, period_s: float, spent_s: float, cpu_s: float) -> None:
+    def _take(self, period_s: float, spent_s: float, cpu_s: float, is_preempted: bool) -> None:
         self.period.add(period_s)
         self.own_work.add(spent_s - self._call_s)
         self.own_cpu.add(cpu_s - self._call_s)
+        if not is_preempted:
+            self.calm_work.add(spent_s - self._call_s)
+        if self._is_beginning:
+            self.intent_cpu.add(cpu_s - self._call_s)
+            self._is_beginning = False
+
+
+def _n_preempted() -> int:
+    """Return how often the kernel took the processor from this thread (Linux)."""
+    return resource.getrusage(resource.RUSAGE_THREAD).ru_nivcsw

@@ -1,5 +1,7 @@
 """The control box's terminals behind the table's signals: polarity, and pulses for drives with two coils."""
 
+from collections.abc import Iterable
+
 import msgspec
 
 from config.cell import CellConfig, CellInput, CellOutput, pin_number
@@ -7,9 +9,38 @@ from config.cell import CellConfig, CellInput, CellOutput, pin_number
 __all__ = ["Pins", "straight_cell"]
 
 
-class _Sensed(msgspec.Struct, frozen=True):
-    pin_bit: int
-    signal_bit: int
+class _Wires:
+    """Wires between terminals and signals, those that are as far apart carried together.
+
+    Args:
+        pairs: Numbers of terminal and signal of each.
+    """
+
+    def __init__(self, pairs: Iterable[tuple[int, int]]) -> None:
+        masks: dict[int, int] = {}
+        for pin, signal in pairs:
+            masks[signal - pin] = masks.get(signal - pin, 0) | 1 << pin
+        self._up = tuple((mask, n) for n, mask in masks.items() if n >= 0)
+        self._down = tuple((mask, -n) for n, mask in masks.items() if n < 0)
+        self.pin_mask = sum(masks.values())
+
+    def signals(self, pins: int) -> int:
+        """Return the signals that are on."""
+        found = 0
+        for mask, n in self._up:
+            found |= (pins & mask) << n
+        for mask, n in self._down:
+            found |= (pins & mask) >> n
+        return found
+
+    def pins(self, signals: int) -> int:
+        """Return the terminals that are on."""
+        found = 0
+        for mask, n in self._up:
+            found |= signals >> n & mask
+        for mask, n in self._down:
+            found |= signals << n & mask
+        return found
 
 
 class _Pulsed(msgspec.Struct, frozen=True):
@@ -43,17 +74,17 @@ class Pins:
 
     def __init__(self, cell: CellConfig | None = None) -> None:
         wiring = straight_cell() if cell is None else cell
-        self._inputs = [_Sensed(1 << pin_number(w.pin), 1 << w.signal) for w in wiring.inputs]
+        self._inputs = _Wires((pin_number(w.pin), w.signal) for w in wiring.inputs)
         self._inverted_in = sum(1 << w.signal for w in wiring.inputs if w.inverted)
         levels = [w for w in wiring.outputs if w.off_pin is None]
-        self._levels = [_Sensed(1 << pin_number(w.pin), 1 << w.signal) for w in levels]
+        self._levels = _Wires((pin_number(w.pin), w.signal) for w in levels)
         self._inverted_out = sum(1 << w.signal for w in levels if w.inverted)
         self._pulsed = [
             _Pulsed(1 << w.signal, 1 << pin_number(w.pin), 1 << pin_number(w.off_pin), round(w.pulse_s * 1e9))
             for w in wiring.outputs
             if w.off_pin is not None and w.pulse_s is not None
         ]
-        self.output_mask = sum(wire.pin_bit for wire in self._levels)
+        self.output_mask = self._levels.pin_mask
         """Terminals that this cell drives."""
         self.output_mask |= sum(drive.on_bit | drive.off_bit for drive in self._pulsed)
         self.longest_pulse_ns = max((drive.pulse_ns for drive in self._pulsed), default=0)
@@ -73,19 +104,11 @@ class Pins:
 
     def signals_in(self, pins: int) -> int:
         """Return the inputs' signals."""
-        signals = 0
-        for wire in self._inputs:
-            if pins & wire.pin_bit:
-                signals |= wire.signal_bit
-        return signals ^ self._inverted_in
+        return self._inputs.signals(pins) ^ self._inverted_in
 
     def signals_out(self, pins: int) -> int:
         """Return the outputs' signals: levels as read back, bistable drives as told last."""
-        signals = 0
-        for wire in self._levels:
-            if pins & wire.pin_bit:
-                signals |= wire.signal_bit
-        return signals ^ self._inverted_out | self._told
+        return self._levels.signals(pins) ^ self._inverted_out | self._told
 
     def pins_out(self, signals: int, pins: int, *, now_ns: int) -> int:
         """Return the terminals for the signals wanted now; others stay as they are.
@@ -95,10 +118,7 @@ class Pins:
             pins: How the output terminals are.
             now_ns: Monotonic time, by which pulses begin and end.
         """
-        pins &= ~self.output_mask
-        for wire in self._levels:
-            if (signals ^ self._inverted_out) & wire.signal_bit:
-                pins |= wire.pin_bit
+        pins = pins & ~self.output_mask | self._levels.pins(signals ^ self._inverted_out)
         for drive in self._pulsed:
             pins |= self._pulse(drive, bool(signals & drive.signal_bit), now_ns)
         return pins

@@ -69,6 +69,7 @@ class RobotiqGripper:
         self._received = b""
         self._outgoing = b""
         self._said: dict[str, int] = {}
+        self._grip: GripCommand | None = None
         self._asked: tuple[int, int, int] | None = None
         self._is_query_out = False
         self._n_silent = 0
@@ -83,7 +84,8 @@ class RobotiqGripper:
         """
         self._received = self._outgoing = b""
         self._said.clear()
-        self._asked, self._is_query_out, self._n_silent, self.state = None, False, 0, None
+        self._grip = self._asked = self.state = None
+        self._is_query_out, self._n_silent = False, 0
         try:
             self._socket = socket.create_connection((host, GRIPPER_PORT), timeout=timeout_s)
         except OSError as error:
@@ -105,7 +107,9 @@ class RobotiqGripper:
 
     def command(self, grip: GripCommand) -> None:
         """Ask for an opening; the same again sends nothing."""
-        scale = self._scale
+        if grip is self._grip:
+            return
+        scale, self._grip = self._scale, grip
         asked = (scale.position(grip.opening_m), scale.speed(grip.speed_m_s), scale.force(grip.force_n))
         if asked != self._asked:
             self._asked = asked

@@ -14,6 +14,8 @@ SPEED_SHARE = 0.95
 """Share of a joint's greatest speed that motion uses, so that the gate's limit is never met by rounding."""
 ALIGN_RAD = 0.01
 """A tool tilted or turned by less than this points down as far as motion cares; the next tick sets it right."""
+SWIFT_TICK_S = 0.005
+"""Shorter ticks than this take the closed form of the inverse, where the arm has one: a real arm's, not the twin's."""
 STILL_RAD_S = 1e-3
 ALIGN_STEP_RAD = 0.35
 """Greatest change of any joint's target in one step while the tool is brought upright."""
@@ -37,7 +39,7 @@ class Follower:
 
     def __init__(self, arm: ArmConfig, *, tick_s: float) -> None:
         motion, joints = arm.motion, arm.joints
-        self._kinematics = Kinematics(arm)
+        self._kinematics = Kinematics(arm, is_swift=tick_s < SWIFT_TICK_S)
         self._home_yaw_rad = arm.tool_yaw_rad
         self._tick_s = tick_s
         self._tool = Limiter(

@@ -39,6 +39,7 @@ _NONE = Reaction()
 _ESTOPS = (Condition.SYSTEM_ESTOP, Condition.ROBOT_ESTOP)
 _POWERLESS = (Condition.FAULT, Condition.VIOLATION, *_ESTOPS)
 _STOPS = (*_POWERLESS, Condition.SAFEGUARD, Condition.PROTECTIVE)
+_OFF_PATH = (*_POWERLESS, Condition.PROTECTIVE)
 _ESTOP_BIT, _STOPPED_BIT = 7, 10
 N_STOPS_A_JOINT = 50
 
@@ -153,12 +154,14 @@ class Modes:
     @property
     def safety(self) -> SafetyMode:
         """The gravest condition that holds."""
-        return next((c.value[0] for c in Condition if c in self._conditions), SafetyMode.NORMAL)
+        if not self._conditions:
+            return SafetyMode.NORMAL
+        return next(c.value[0] for c in Condition if c in self._conditions)
 
     @property
     def is_stopped_by_safety(self) -> bool:
         """A stop holds: no program may move the arm."""
-        return any(c in self._conditions for c in _STOPS)
+        return bool(self._conditions) and any(c in self._conditions for c in _STOPS)
 
     @property
     def is_reduced(self) -> bool:
@@ -181,15 +184,15 @@ class Modes:
     @property
     def safety_status_bits(self) -> int:
         """RTDE's bits 0 to 10."""
-        bits = sum(1 << c.value[1] for c in self._conditions)
         if not self._conditions:
-            bits |= 1
+            return 1
+        bits = sum(1 << c.value[1] for c in self._conditions)
         if any(c in self._conditions for c in _ESTOPS):
             bits |= 1 << _ESTOP_BIT
         return bits | int(self.is_stopped_by_safety) << _STOPPED_BIT
 
     def _stops_off_path(self) -> bool:
-        return any(c in self._conditions for c in (*_POWERLESS, Condition.PROTECTIVE))
+        return bool(self._conditions) and any(c in self._conditions for c in _OFF_PATH)
 
     # -------------------------------------------------------------------------------------------------- what happens
 

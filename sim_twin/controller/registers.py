@@ -102,7 +102,7 @@ def _writers(bank: RegisterBank) -> dict[str, Callable]:
     found: dict[str, Callable] = {}
     for i in range(N_NUMBERS):
         found[f"input_int_register_{i}"] = _setter(bank.set_int, i)
-        found[f"input_double_register_{i}"] = _setter(bank.set_double, i)
+        found[f"input_double_register_{i}"] = _double_setter(bank.doubles, i)
     for i in range(64, N_BITS):
         found[f"input_bit_register_{i}"] = _setter(bank.set_bit, i)
     for first in (0, 32):
@@ -112,6 +112,15 @@ def _writers(bank: RegisterBank) -> dict[str, Callable]:
 
 def _setter(store: Callable, i: int) -> Callable:
     return lambda value: store(i, value)
+
+
+def _double_setter(values: list[float], i: int) -> Callable:
+    """Of the eleven that come with every servoj: without a look at the number, which is in range."""
+
+    def store(value: float) -> None:
+        values[i] = float(value)
+
+    return store
 
 
 def _reader(values: list, i: int) -> Callable:

@@ -1,5 +1,6 @@
 import math
 
+import msgspec
 import mujoco
 import numpy as np
 import pytest
@@ -8,6 +9,7 @@ from hypothesis import strategies as st
 
 from config.loader import load_arm
 from robot.description import arm_model, forward_kinematics, tool_down
+from robot.downward import DownwardArm
 from robot.kinematics import Kinematics, ToolChain, UnreachableError
 
 ARM = load_arm("ur5e")
@@ -102,3 +104,50 @@ def test_what_cannot_be_reached_is_said_and_does_not_spoil_the_next_answer(where
 def test_loading_prints_nothing(capfd):
     Kinematics(ARM)
     assert capfd.readouterr().out == ""
+
+
+@given(
+    st.tuples(*[st.floats(a, b) for a, b in zip(LOW.tolist(), HIGH.tolist(), strict=True)]),
+    st.floats(-1.0, 1.0),
+    st.tuples(*[st.floats(-0.02, 0.02)] * 6),
+)
+def test_the_closed_form_gives_placos_answer(place, turn, off):
+    yaw = ARM.tool_yaw_rad + turn
+    try:
+        expected = KINEMATICS.solve(place, ARM.home_rad, yaw_rad=yaw)
+    except UnreachableError:
+        return
+    seed = tuple(a + b for a, b in zip(expected, off, strict=True))
+    found = DownwardArm(ARM).solve(place, yaw, seed)
+    assert found is not None
+    assert np.allclose(found, expected, rtol=0.0, atol=1e-4)  # placo's own tolerance is 1e-5 m
+    T = forward_kinematics(ARM, found)
+    assert np.allclose(T[:3, 3], place, atol=1e-9)
+    assert np.allclose(T[:3, :3], tool_down(yaw), atol=1e-9)
+
+
+@given(JOINTS.filter(lambda q: abs(math.sin(q[4])) > 0.1 and abs(math.sin(q[2])) > 0.05))
+def test_the_closed_form_keeps_to_its_seeds_side_and_turns(q):
+    side = math.copysign(1.0, math.sin(q[4]))
+    upright = (q[0], q[1], q[2], side * math.pi / 2 - q[1] - q[2], side * math.pi / 2, q[5])
+    T = forward_kinematics(ARM, upright)
+    away = T[0, 3] * math.cos(q[0]) + T[1, 3] * math.sin(q[0])
+    if abs(away) < 0.01:
+        return  # over the base, where either shoulder may be meant
+    yaw = math.atan2(T[1, 0], T[0, 0])
+    found = DownwardArm(ARM).solve(tuple(T[:3, 3].tolist()), yaw, upright)
+    assert found == pytest.approx(upright, abs=1e-6)
+
+
+@pytest.mark.parametrize("broken", [(math.nan, 0.0, 0.3), (math.inf, 0.0, 0.3), (3.0, 0.0, 0.3), (0.01, 0.0, 0.3)])
+def test_where_no_joints_lead_the_closed_form_has_no_answer(broken):
+    assert DownwardArm(ARM).solve(broken, 0.0, ARM.home_rad) is None
+    with pytest.raises(UnreachableError):
+        Kinematics(ARM, is_swift=True).solve(broken, ARM.home_rad)
+
+
+def test_an_arm_of_another_build_has_no_closed_form():
+    assert DownwardArm.fits(ARM)
+    joints = list(ARM.joints)
+    joints[3] = msgspec.structs.replace(joints[3], alpha_rad=0.1)
+    assert not DownwardArm.fits(msgspec.structs.replace(ARM, joints=tuple(joints)))

@@ -4,7 +4,7 @@ from collections import deque
 
 import numpy as np
 
-from sim_twin.controller.motion.poses import Array
+from sim_twin.controller.motion.poses import Array, length
 
 __all__ = ["ContactWatch"]
 
@@ -29,7 +29,7 @@ class ContactWatch:
     def push(self, force_n: Array, speed_m_s: Array) -> None:
         """Take in one slice: force of the world on the tool and the tool's speed, base axes.  (3,), (3,)"""
         self._felt.append(np.array(force_n))
-        if float(np.linalg.norm(speed_m_s)) > MOVING_M_S:
+        if length(speed_m_s) > MOVING_M_S:
             self._speed = np.array(speed_m_s)
 
     def slices_since_contact(self, direction: Array | None = None) -> int:
@@ -39,12 +39,12 @@ class ContactWatch:
             direction: Way the tool goes, base axes; its last motion where absent or zero.  (3,)
         """
         way = self._speed if direction is None or not np.any(direction) else np.asarray(direction)
-        length = float(np.linalg.norm(way))
-        if length == 0.0:
+        size = length(way)
+        if size == 0.0:
             return 0
         n = 0
         for force in reversed(self._felt):
-            if -float(force @ way) / length < self._threshold_n:
+            if -float(force @ way) / size < self._threshold_n:
                 break
             n += 1
         return n

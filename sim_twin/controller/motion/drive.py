@@ -21,7 +21,7 @@ from sim_twin.controller.motion.limits import (
     default_limits,
 )
 from sim_twin.controller.motion.motions import Motions
-from sim_twin.controller.motion.poses import Array, pose_from_matrix, vec6
+from sim_twin.controller.motion.poses import Array, length, pose_from_matrix, vec6
 from sim_twin.controller.motion.setpoint import SLICE_S
 from sim_twin.controller.motion.wrench import GRAVITY_M_S2, NM_PER_A, ContactWrench, is_same_payload, payload_bias
 from sim_twin.controller.states import MotionOrder
@@ -38,6 +38,7 @@ HELD_RAD_S = 0.005
 BRAKE_SOLIMP = (0.9999, 0.9999)
 """A brake that hardly creeps; MuJoCo's own friction gives way in proportion to the load."""
 N_HISTORY = 1000
+NOWHERE_M = np.zeros(3)
 
 
 class Measured(msgspec.Struct, frozen=True, kw_only=True):
@@ -299,20 +300,20 @@ class TwinDrive:
 
     def _asked_tool_m(self) -> Array:
         """Where the set-point brings the tool; of no interest where there is no plane."""
-        return self.core.tool_at(self.motions.setpoint.q_target)[:3, 3] if self.limits.planes else np.zeros(3)
+        return self.core.tool_at(self.motions.setpoint.q_target)[:3, 3] if self.limits.planes else NOWHERE_M
 
     def _felt(self) -> Felt:
         """What the limits are judged by. Forces are smoothed: a blow of a millisecond passes through no real sensor."""
         now = self.measured
         share = SLICE_S / (SLICE_S + FELT_S)
-        self._felt_force_n += share * (float(np.linalg.norm(now.wrench[:3])) - self._felt_force_n)
+        self._felt_force_n += share * (length(now.wrench[:3]) - self._felt_force_n)
         self._felt_nm += share * (now.external_nm - self._felt_nm)
         return Felt(
             q_rad=now.q_rad,
             qd_rad_s=now.qd_rad_s,
             q_expected_rad=self._expected,
             tool_m=now.tcp_pose[:3],
-            tool_speed_m_s=float(np.linalg.norm(now.tcp_speed[:3])),
+            tool_speed_m_s=length(now.tcp_speed[:3]),
             force_n=self._felt_force_n,
             external_nm=self._felt_nm,
         )

@@ -4,7 +4,8 @@ Two tiers, as on a robot: what is *asked* beyond a limit brings a protective sto
 limit and its tolerance (the trueness of the e-Series' safety functions) is a violation and cuts the drives.
 """
 
-from collections.abc import Sequence
+import math
+from collections.abc import Iterable, Sequence
 from enum import Enum
 
 import msgspec
@@ -133,22 +134,22 @@ def default_limits(arm: ArmConfig) -> SafetyLimits:
 
 def breach_asked(limits: SafetyLimits, asked: Asked) -> Breach | None:
     """Return the first limit that a set-point passes, or None."""
-    if not np.isfinite(asked.q_rad).all():
+    q, qd = asked.q_rad.tolist(), asked.qd_rad_s.tolist()
+    if not all(map(math.isfinite, q)):
         return Breach(cause=Cause.NOT_FINITE, text="target position is not a number; check what the program computes")
-    speed = np.abs(asked.qd_rad_s)
-    i = _first(speed - np.multiply(limits.speed_rad_s, JUMP_SPEEDS))
+    speed = [abs(v) for v in qd]
+    i = _first(v - most * JUMP_SPEEDS for v, most in zip(speed, limits.speed_rad_s, strict=True))
     if i is not None:
         jump = speed[i] * SLICE_S
         return _breach(Cause.JUMP, i, f"target jumped by {jump:.3f} rad in one slice; send nearer targets")
-    i = _first(speed - np.multiply(limits.speed_rad_s, 1.0 + 1e-9))
+    i = _first(v - most * (1.0 + 1e-9) for v, most in zip(speed, limits.speed_rad_s, strict=True))
     if i is not None:
         return _breach(Cause.TARGET_SPEED, i, f"target moves at {speed[i]:.2f} rad/s, beyond its limit")
     # Who stands beyond a limit may stand there and come back.
-    above = np.where(asked.qd_rad_s > 0.0, asked.q_rad - limits.q_max_rad, 0.0)
-    below = np.where(asked.qd_rad_s < 0.0, limits.q_min_rad - asked.q_rad, 0.0)
-    i = _first(np.maximum(above, below))
+    ranges = zip(q, qd, limits.q_min_rad, limits.q_max_rad, strict=True)
+    i = _first((x - high if v > 0.0 else low - x) if v else 0.0 for x, v, low, high in ranges)
     if i is not None:
-        return _breach(Cause.JOINT_LIMIT, i, f"target {asked.q_rad[i]:.3f} rad is beyond the joint's limit")
+        return _breach(Cause.JOINT_LIMIT, i, f"target {q[i]:.3f} rad is beyond the joint's limit")
     leaving = tuple(p for p in limits.planes if float(np.dot(p.normal, asked.tool_m - asked.tool_before_m)) < 0.0)
     if _is_outside(leaving, asked.tool_m, 0.0):
         return Breach(cause=Cause.PLANE, text="target position is beyond a safety plane")
@@ -161,11 +162,13 @@ def breach_felt(limits: SafetyLimits, felt: Felt) -> Breach | None:
 
 
 def _violation(limits: SafetyLimits, felt: Felt) -> Breach | None:
-    i = _beyond(felt.q_rad, limits, JOINT_TOLERANCE_RAD)
+    q = felt.q_rad.tolist()
+    ranges = zip(q, limits.q_min_rad, limits.q_max_rad, strict=True)
+    i = _first(max(x - high, low - x) - JOINT_TOLERANCE_RAD for x, low, high in ranges)
     if i is not None:
-        return _breach(Cause.JOINT_VIOLATION, i, f"joint at {felt.q_rad[i]:.3f} rad is beyond its limit")
-    speed = np.abs(felt.qd_rad_s)
-    i = _first(speed - limits.speed_rad_s - JOINT_SPEED_TOLERANCE_RAD_S)
+        return _breach(Cause.JOINT_VIOLATION, i, f"joint at {q[i]:.3f} rad is beyond its limit")
+    speed = [abs(v) for v in felt.qd_rad_s.tolist()]
+    i = _first(v - most - JOINT_SPEED_TOLERANCE_RAD_S for v, most in zip(speed, limits.speed_rad_s, strict=True))
     if i is not None:
         return _breach(Cause.JOINT_SPEED_VIOLATION, i, f"joint turns at {speed[i]:.2f} rad/s, beyond its limit")
     if felt.tool_speed_m_s > limits.tool_speed_m_s + SPEED_TOLERANCE_M_S:
@@ -180,14 +183,14 @@ def _violation(limits: SafetyLimits, felt: Felt) -> Breach | None:
 
 
 def _collision(limits: SafetyLimits, felt: Felt) -> Breach | None:
-    outside = np.abs(felt.external_nm)
-    i = _first(outside - limits.collision_nm)
+    outside = [abs(v) for v in felt.external_nm.tolist()]
+    i = _first(v - most for v, most in zip(outside, limits.collision_nm, strict=True))
     if i is not None:
         return _breach(Cause.JOINT_COLLISION, i, f"collision detected by joint: {outside[i]:.0f} Nm from outside")
     if felt.force_n > limits.tool_force_n:
         return Breach(cause=Cause.TOOL_COLLISION, text=f"collision detected at the tool: {felt.force_n:.0f} N")
-    off = np.abs(felt.q_expected_rad - felt.q_rad)
-    i = _first(off - limits.deviation_rad)
+    off = [abs(v) for v in (felt.q_expected_rad - felt.q_rad).tolist()]
+    i = _first(v - limits.deviation_rad for v in off)
     if i is not None:
         return _breach(Cause.DEVIATION, i, f"position deviates from path by {off[i]:.3f} rad")
     return None
@@ -197,14 +200,15 @@ def _breach(cause: Cause, joint: int, text: str) -> Breach:
     return Breach(cause=cause, text=f"joint {joint}: {text}", joint=joint)
 
 
-def _first(excess: Array) -> int | None:
-    """Return the first joint with more than nothing too much; what is not a number is too much."""
-    over = ~(excess <= 0.0)
-    return int(over.argmax()) if over.any() else None
+def _first(excess: Iterable[float]) -> int | None:
+    """Return the first joint with more than nothing too much; what is not a number is too much.
 
-
-def _beyond(q: Array, limits: SafetyLimits, tolerance: float) -> int | None:
-    return _first(np.maximum(q - limits.q_max_rad, limits.q_min_rad - q) - tolerance)
+    In plain floats, a third of what arrays of six cost.
+    """
+    for i, too_much in enumerate(excess):
+        if not too_much <= 0.0:
+            return i
+    return None
 
 
 def _is_outside(planes: Sequence[Plane], tool_m: Array, tolerance: float) -> bool:

@@ -48,17 +48,18 @@ def _compile_write(name: str, word: str, scope: Scope) -> Write:
 
 
 def _whole(write: Write, value: Code[Value]) -> Code[Signal | None]:
-    def run(frame: Frame) -> Signal | None:
-        if isinstance(value, Fast):
-            write(frame, copied(value.run(frame)))
-        return None
+    if isinstance(value, Fast):
+        evaluate = value.run
+
+        def run(frame: Frame) -> Signal | None:
+            write(frame, copied(evaluate(frame)))
+
+        return Fast(run)
 
     def run_slowly(frame: Frame) -> Steps[Signal | None]:
-        if isinstance(value, Slow):
-            write(frame, copied((yield from value.run(frame))))
-        return None
+        write(frame, copied((yield from value.run(frame))))
 
-    return Slow(run_slowly) if isinstance(value, Slow) else Fast(run)
+    return Slow(run_slowly)
 
 
 def _path(target: Index | Member, scope: Scope) -> tuple[str, list[_Step]]:

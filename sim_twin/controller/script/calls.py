@@ -189,12 +189,15 @@ def _call_of_builtin(
         meter.line = node.line
         return ScriptRuntimeError(f"{node.name}(): {error}")
 
+    def named(*values: Value) -> "Value | Generator[Wait | None, None, Value]":
+        given = zip(names, values[n_positional:], strict=True)
+        return builtin(*values[:n_positional], **dict(given))
+
+    function = named if names else builtin
+
     def result_of(*values: Value) -> "Value | Generator[Wait | None, None, Value]":
         try:
-            if names:
-                given = map(copied, values[n_positional:])
-                return builtin(*map(copied, values[:n_positional]), **dict(zip(names, given, strict=True)))
-            return builtin(*map(copied, values))
+            return function(*map(copied, values))
         except _BAD_ARGUMENTS as error:
             raise failed(error) from error
 
@@ -203,8 +206,11 @@ def _call_of_builtin(
         return _slow_builtin(operands, result_of, failed)
 
     def value_of(*values: Value) -> Value:
-        result = result_of(*values)
-        if isinstance(result, GeneratorType):
+        try:
+            result = function(*map(copied, values))
+        except _BAD_ARGUMENTS as error:
+            raise failed(error) from error
+        if type(result) is GeneratorType:
             raise TypeError(f"builtin {node.name} returned a generator, so declare it as a generator function")
         return result  # pyright: ignore[reportReturnType] - no generator, as tested
 

@@ -131,7 +131,8 @@ class Routine:
         self.scope = scope
         self.body: Code[Signal | None] | None = None
         self.defaults: dict[str, Code[Value]] = {}
+        self._blank: Frame = [None, *[UNSET] * len(scope.places)]
 
     def frame(self) -> Frame:
         """Return a frame whose variables have no values; without a return the function's value is None."""
-        return [None, *[UNSET] * len(self.scope.places)]
+        return self._blank.copy()

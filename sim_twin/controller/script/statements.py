@@ -1,6 +1,7 @@
 """Compiles statements to closures, which return how they ended: None to go on, or a signal."""
 
 from collections.abc import Callable
+from typing import Any
 
 from sim_twin.controller.script.assignments import compile_assignment
 from sim_twin.controller.script.code import Code, Fast, Frame, Signal, Slow
@@ -65,14 +66,16 @@ def _block(body: tuple[Statement, ...], scope: Scope) -> Code[Ending]:
 
 def _slow_block(steps: list[tuple[int, Code[Ending]]], scope: Scope) -> Code[Ending]:
     meter, cost = scope.context.meter, len(steps)
+    # Whether a step may take time is asked here once, not at every turn.
+    kinds: list[tuple[int, Callable[[Frame], Any], bool]] = [(n, s.run, isinstance(s, Slow)) for n, s in steps]
 
     def run(frame: Frame) -> Steps[Ending]:
         meter.left -= cost
         if meter.left < 0:
             _exhausted(scope)
-        for line, step in steps:
+        for line, step, is_slow in kinds:
             meter.line = line
-            signal = (yield from step.run(frame)) if isinstance(step, Slow) else step.run(frame)
+            signal = (yield from step(frame)) if is_slow else step(frame)
             if signal is not None:
                 return signal
         return None

@@ -85,6 +85,12 @@ class Recipe:
         self._body = struct.Struct(">" + body)
         self._frame = struct.Struct(">HB" + "B" * len(self._head) + body)
         self.n_bytes = self._frame.size
+        self._parts: list[tuple[str, int, int]] = []
+        """Name, first number and how many, of each field."""
+        at = 0
+        for name, kind in zip(self.names, self.kinds, strict=True):
+            self._parts.append((name, at, kind.n_items))
+            at += kind.n_items
 
     def pack(self, numbers: Sequence[float]) -> bytes:
         """Return the frame of a data package; vectors come flattened, in the recipe's order."""
@@ -102,13 +108,7 @@ class Recipe:
                 "check the recipe id and the order of the fields"
             )
         numbers = self._body.unpack(body)
-        values: list[tuple[str, Value]] = []
-        at = 0
-        for name, kind in zip(self.names, self.kinds, strict=True):
-            n = kind.n_items
-            values.append((name, numbers[at] if n == 1 else numbers[at : at + n]))
-            at += n
-        return values
+        return [(name, numbers[at] if n == 1 else numbers[at : at + n]) for name, at, n in self._parts]
 
 
 def frame(kind: Kind, payload: bytes) -> bytes:
