@@ -147,7 +147,7 @@ class ForwardModel(Section, frozen=True, kw_only=True):
     kind: OneOf["geometric", "learned"] = "geometric"
     hidden: Annotated[tuple[Width, ...], Meta(min_length=1, max_length=4)] = (64, 64)
     history: Annotated[int, Meta(ge=1, le=64)] = 20
-    """Time steps that bearings are told from."""
+    """Time steps from which it is told what comes along with the hand."""
     learning_rate: Positive = 1e-3
     batch: Count = 64
     updates_per_trial: Annotated[int, Meta(ge=0, le=10_000)] = 30

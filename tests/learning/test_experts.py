@@ -70,6 +70,15 @@ def test_all_skills_are_learnt_whatever_the_order_of_the_distances(config, colum
     assert min(success) >= 0.6, success
 
 
+@pytest.mark.slow
+def test_most_skills_are_learnt_with_a_learned_forward_model():
+    """In one trial each; a thing approached in a straight line may be taken for its mirror image beside the line."""
+    practice = Practice(load_learning("learned"), seed=21)
+    practice.practise(300)
+    success = practice.success()
+    assert np.mean(success) >= 0.7, success
+
+
 def test_nothing_works_before_anything_was_learnt(config):
     assert np.mean(Practice(config, seed=21).success(5)) < 0.2
 
