@@ -17,6 +17,8 @@ from robot.station import Station
 
 __all__ = ["Agent", "EpochRecord", "GoalJudge", "GoalSelector", "TrialRecord"]
 
+FAIR = 0.5
+"""A try at a goal whose place is reached less than half as often while something holds says nothing against a skill."""
 RETREAT_STEPS = 20
 RISEN_WITHIN_M = 0.012
 
@@ -215,9 +217,10 @@ class Agent:
         self._stopwatch.lap("selectors")
         predicted = self.experts.utility(subgoal, scene.percept)
         skill = self.experts.skill(subgoal)
+        is_fair = self.subgoal_selector.freedom(subgoal, holds) >= FAIR
         self.experts.begin_trial(subgoal, scene.percept, explore=explore)
         outcome, n_steps = self._pursue(station, scene, subgoal)
-        self.experts.end_trial(outcome)
+        self.experts.end_trial(outcome, is_fair=is_fair)
         self._stopwatch.lap("training")
         attempt = Attempt(
             epoch=epoch,

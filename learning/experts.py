@@ -149,10 +149,11 @@ class ExpertSet:
             if is_achieved:
                 self._came_about.append((goal, np.array(self._trace), np.array(result.percept.distances_m)))
 
-    def end_trial(self, outcome: TrialOutcome) -> None:
+    def end_trial(self, outcome: TrialOutcome, *, is_fair: bool = True) -> None:
         """Close the trial, learn what it showed and train.
 
-        A blocked trial says nothing against the skill, not even where the arm got stuck; a void one nothing at all.
+        A blocked trial says nothing against the skill, not even where the arm got stuck, nor does a miss that was no
+        fair try, as with a full hand; a void one says nothing at all.
         """
         if not self._is_exploring or outcome is TrialOutcome.VOID:
             return
@@ -160,7 +161,7 @@ class ExpertSet:
         is_missed = outcome is TrialOutcome.NOT_REACHED
         for goal, trace, end_m in self._came_about:
             self._models[goal].succeed(trace, end_m, is_own=goal == self._subgoal)
-        if outcome is not TrialOutcome.BLOCKED:
+        if not (outcome is TrialOutcome.BLOCKED or (is_missed and not is_fair)):
             for dead_end in self._dead_ends:
                 model.fail(dead_end)
             if is_missed and self._trace:

@@ -70,6 +70,10 @@ class SubgoalSelector(Protocol):
         """Learn from one trial. Void attempts change nothing."""
         ...
 
+    def freedom(self, goal: int, holds: GoalState) -> float:
+        """Return how fair a try at a goal is, in [0, 1]: less where what holds was seen to keep the arm away."""
+        ...
+
     def changed_goals(self) -> tuple[int, ...]:
         """Return the goals for which what they are believed to need was revised by the last update."""
         ...
@@ -101,8 +105,8 @@ class Experts(Protocol):
         """Take in what the step came to; achieved tells every goal that came about in this very step."""
         ...
 
-    def end_trial(self, outcome: TrialOutcome) -> None:
-        """Close the trial and, when learning, train."""
+    def end_trial(self, outcome: TrialOutcome, *, is_fair: bool = True) -> None:
+        """Close the trial and, when learning, train. A miss that was no fair try says nothing against the skill."""
         ...
 
     def utility(self, subgoal: int, percept: Percept) -> float:

@@ -105,6 +105,29 @@ class Idle(ToyExperts):
         return super().act(percept).__class__(heading_rad=0.0, distance_m=0.0, height_m=0.05)
 
 
+class Asking(Sequence):
+    """Says how fair a try is, by what holds; records what it is asked."""
+
+    def __init__(self, *subgoals, fair):
+        super().__init__(*subgoals)
+        self.fair, self.asked = fair, []
+
+    def freedom(self, goal, holds):
+        self.asked.append((goal, holds))
+        return self.fair
+
+
+class Told(Idle):
+    """Never moves; records whether a miss was a fair try."""
+
+    def __init__(self, rng):
+        super().__init__(rng)
+        self.told = []
+
+    def end_trial(self, outcome, *, is_fair=True):
+        self.told.append(is_fair)
+
+
 def skilled(kind=ToyExperts):
     experts = kind(np.random.default_rng(0))
     experts.load_state_dict({**experts.state_dict(), "worth": 9.0 * np.eye(N_GOALS)})
@@ -267,6 +290,18 @@ def test_the_goal_selector_hears_of_every_epoch_but_void_ones():
     assert agent.goal_selector.ended == [(2, 9.0, True)]
     learn(agent, void_epochs=(5,))
     assert len(agent.goal_selector.ended) == 1
+
+
+def test_experts_hear_whether_what_holds_left_them_a_fair_try():
+    for fair, expected in ((1.0, True), (0.5, True), (0.49, False)):
+        selector, experts = Asking(2, fair=fair), Told(np.random.default_rng(0))
+        agent = Agent(
+            goal_selector=FixedGoal(2), subgoal_selector=selector, experts=experts, judge=ToyJudge(),
+            protocol=Experiment(trials=1),
+        )  # fmt: skip
+        learn(agent)
+        assert experts.told == [expected]
+        assert selector.asked == [(2, (False,) * N_GOALS)]
 
 
 def test_prediction_and_skill_are_said_before_the_trial():

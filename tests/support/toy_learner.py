@@ -190,6 +190,9 @@ class ToySubgoalSelector:
     def predict_allowed(self, goal: int, state: GoalState) -> float:
         return float(self._verdicts.get(_key(goal, state), True))
 
+    def freedom(self, goal: int, holds: GoalState) -> float:
+        return 1.0
+
     def changed_goals(self) -> tuple[int, ...]:
         return ()
 
@@ -249,7 +252,7 @@ class ToyExperts:
     def observe(self, result: StepResult, achieved: GoalState) -> None:
         pass
 
-    def end_trial(self, outcome: TrialOutcome) -> None:
+    def end_trial(self, outcome: TrialOutcome, *, is_fair: bool = True) -> None:
         if not self._explore or outcome is TrialOutcome.VOID:
             return
         if outcome is not TrialOutcome.BLOCKED:
