@@ -32,8 +32,11 @@ class Explanation(msgspec.Struct, frozen=True, kw_only=True):
     literals: tuple[LiteralBelief, ...]
     """Every literal worth telling, most probable first."""
     n_for: int
-    """Remembered attempts that came out as the conjunction says."""
+    """Remembered attempts since it last changed that came out as the conjunction says."""
     n_against: int
+    n_for_before: int
+    """The same of attempts before, which other rules may have decided."""
+    n_against_before: int
     changed_epoch: int | None
     """When the most probable conjunction last changed."""
     skill: float
@@ -48,17 +51,23 @@ def explain_graph(graph: Graph) -> tuple[Explanation, ...]:
 
 def _explain(graph: Graph, goal: int) -> Explanation:
     needs, belief = graph.most_probable(goal), graph.beliefs[goal]
-    evidence = graph.evidence(goal)
-    agrees = [(e.kind is Kind.ACHIEVED) == any(needs.allow(reading) for reading in e.readings) for e in evidence]
+    changed_epoch = graph.changed_epoch(goal)
+    agrees: dict[bool, list[bool]] = {True: [], False: []}
+    for e in graph.evidence(goal):
+        is_since = changed_epoch is None or e.epoch >= changed_epoch
+        is_allowed = any(needs.allow(reading) for reading in e.readings)
+        agrees[is_since].append((e.kind is Kind.ACHIEVED) == is_allowed)
     return Explanation(
         goal=goal,
         needs_on=_members(needs.on, graph.n_goals),
         needs_off=_members(needs.off, graph.n_goals),
         probability=belief.confidence,
         literals=_literals(graph, goal),
-        n_for=sum(agrees),
-        n_against=len(agrees) - sum(agrees),
-        changed_epoch=graph.changed_epoch(goal),
+        n_for=agrees[True].count(True),
+        n_against=agrees[True].count(False),
+        n_for_before=agrees[False].count(True),
+        n_against_before=agrees[False].count(False),
+        changed_epoch=changed_epoch,
         skill=graph.skill(goal),
         plan=graph.plan(goal, START),
     )

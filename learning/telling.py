@@ -75,7 +75,12 @@ def explanation_table(explanations: Sequence[Explanation], goals: Sequence[str])
     for heading in ("goal", "needs, and the plan from a fresh table", "on what evidence"):
         table.add_column(heading, overflow="fold")
     for told in explanations:
-        needs = [goals[i] for i in told.needs_on] + [f"not {goals[i]}" for i in told.needs_off]
+        sure = {(literal.goal, literal.is_on): literal.probability for literal in told.literals}
+        needs = [
+            f"{'' if is_on else 'not '}{goals[i]} {sure.get((i, is_on), 0.0):.0%}"
+            for is_on, members in ((True, told.needs_on), (False, told.needs_off))
+            for i in members
+        ]
         doubts = [
             f"{'' if literal.is_on else 'not '}{goals[literal.goal]} {literal.probability:.0%}"
             for literal in told.literals
@@ -86,11 +91,22 @@ def explanation_table(explanations: Sequence[Explanation], goals: Sequence[str])
             "\n".join(
                 [*(needs or ["nothing"]), *(f"[dim]perhaps {doubt}[/dim]" for doubt in doubts), _plan(told, goals)]
             ),
-            f"{told.probability:.0%} sure\n{told.n_for} for, {told.n_against} against\n"
-            + ("never changed" if told.changed_epoch is None else f"changed at epoch {told.changed_epoch}")
-            + f"\nskill {told.skill:.0%}",
+            "\n".join([f"{told.probability:.0%} sure of all", *_evidence(told), f"skill {told.skill:.0%}"]),
         )
     return table
+
+
+def _evidence(told: Explanation) -> list[str]:
+    """Return the attempts that speak for and against what is believed, those before it last changed apart."""
+    counts = f"{told.n_for} for, {told.n_against} against"
+    if told.changed_epoch is None:
+        return [counts, "never changed"]
+    before = f"[dim]before: {told.n_for_before} for, {told.n_against_before} against[/dim]"
+    return [
+        f"since epoch {told.changed_epoch}:",
+        counts,
+        *([before] if told.n_for_before + told.n_against_before else []),
+    ]
 
 
 def _plan(told: Explanation, goals: Sequence[str]) -> str:

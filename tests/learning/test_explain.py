@@ -33,7 +33,22 @@ def test_it_names_what_must_be_on_and_what_must_be_off(graph):
     told = explain_graph(graph)[2]
     assert (told.needs_on, told.needs_off) == ((0,), (1,))
     assert told.probability > 0.9
-    assert (told.n_for, told.n_against) == (36, 0)
+    assert (told.n_for + told.n_for_before, told.n_against + told.n_against_before) == (36, 0)
+
+
+def test_evidence_of_rules_that_are_gone_is_told_apart():
+    graph = Graph(n_goals=N, config=SubgoalSelection(hazard=0.01))
+    on, off = (True, False, False), (False, False, False)
+    for epoch, (state, is_achieved) in enumerate([(on, True), (off, False)] * 15 + [(on, False), (off, True)] * 15):
+        graph.learn(attempt(epoch, 2, state, TrialOutcome.ACHIEVED if is_achieved else TrialOutcome.BLOCKED))
+    told = explain_graph(graph)[2]
+    assert (told.needs_on, told.needs_off) == ((), (0,))
+    assert told.changed_epoch is not None
+    assert 30 <= told.changed_epoch < 45
+    assert told.n_against == 0
+    assert told.n_for == 60 - told.changed_epoch
+    assert told.n_for_before + told.n_against_before == told.changed_epoch
+    assert told.n_against_before >= 15
 
 
 def test_a_literals_probability_is_that_of_all_conjunctions_that_hold_it(graph):
