@@ -149,9 +149,9 @@ class EraSummary(msgspec.Struct, frozen=True, kw_only=True):
     """Mean trials of the successes, over the same evaluations."""
     optimal_by_goal: tuple[int | None, ...]
     trials_over_optimum: float | None
-    """Mean over goals of the trials beyond the optimum, successes only."""
-    trials_over_optimum_with_failures: float | None
-    """The same with a failure counting as all trials of an epoch."""
+    """Mean over goals of the trials beyond the optimum; an epoch failed or cut short counts as all its trials."""
+    trials_over_optimum_of_successes: float | None
+    """The same of those that succeeded alone."""
 
 
 class Summary(msgspec.Struct, frozen=True, kw_only=True):
@@ -175,10 +175,21 @@ def summarise(
     graph_rows: Sequence[GraphRow],
     *,
     n_goals: int,
+    n_trials: int,
     changes: Sequence[int],
     optima: Sequence[Sequence[int | None]],
 ) -> Summary:
-    """Return the figures of a run from its rows. optima: least trials of each goal, one sequence an era."""
+    """Return the figures of a run from its rows.
+
+    Args:
+        goal_rows: One an epoch.
+        evaluation_rows: One a goal and evaluation.
+        graph_rows: One a look at the learnt graph.
+        n_goals: How many goals there are.
+        n_trials: Trials that an epoch has.
+        changes: Epochs at which the rules changed.
+        optima: Least trials of each goal, one sequence an era.
+    """
     n_epochs = len(goal_rows)
     spans = eras(changes, n_epochs) if n_epochs else []
     parts = tuple(
@@ -187,6 +198,7 @@ def summarise(
             [row for row in evaluation_rows if era.holds(row.rules_epoch)],
             [row for row in graph_rows if era.holds(row.rules_epoch)],
             best,
+            n_trials,
         )
         for era, best in zip(spans, optima, strict=False)
     )
@@ -203,7 +215,11 @@ def summarise(
 
 
 def _summarise_era(
-    era: Era, rows: Sequence[EvaluationRow], graph_rows: Sequence[GraphRow], optima: Sequence[int | None]
+    era: Era,
+    rows: Sequence[EvaluationRow],
+    graph_rows: Sequence[GraphRow],
+    optima: Sequence[int | None],
+    n_trials: int,
 ) -> EraSummary:
     by_epoch: dict[int, list[EvaluationRow]] = {}
     for row in rows:
@@ -215,7 +231,10 @@ def _summarise_era(
     settled_from = max(era.from_epoch, era.until_epoch - SETTLED_EPOCHS)
     settled = [[row for row in rows if row.goal == goal and row.epoch > settled_from] for goal in range(len(optima))]
     trials = tuple(_ratio(_total(of_goal, "trials_achieved"), _total(of_goal, "n_successes")) for of_goal in settled)
-    trials_all = [_ratio(_total(of_goal, "trials_all"), _total(of_goal, "n_tests")) for of_goal in settled]
+    trials_all = [
+        _ratio(_total(of_goal, "trials_all") + n_trials * _total(of_goal, "n_void"), _total(of_goal, "n_all"))
+        for of_goal in settled
+    ]
     return EraSummary(
         from_epoch=era.from_epoch,
         until_epoch=era.until_epoch,
@@ -225,8 +244,8 @@ def _summarise_era(
         success_by_goal=tuple(_ratio(_total(of_goal, "n_successes"), _total(of_goal, "n_all")) for of_goal in settled),
         trials_by_goal=trials,
         optimal_by_goal=tuple(optima),
-        trials_over_optimum=_mean_excess(trials, optima),
-        trials_over_optimum_with_failures=_mean_excess(trials_all, optima),
+        trials_over_optimum=_mean_excess(trials_all, optima),
+        trials_over_optimum_of_successes=_mean_excess(trials, optima),
     )
 
 

@@ -35,7 +35,9 @@ def optima():
 def test_the_toy_learns_recovers_and_needs_no_more_trials_than_the_optimum(whole):
     goals = read_rows(whole / "goals.csv", GoalRow)
     evaluations = read_rows(whole / "evaluations.csv", EvaluationRow)
-    summary = summarise(goals, evaluations, [], n_goals=N_GOALS, changes=[CHANGE_EPOCH], optima=optima())
+    summary = summarise(
+        goals, evaluations, [], n_goals=N_GOALS, n_trials=PROTOCOL.trials, changes=[CHANGE_EPOCH], optima=optima()
+    )
     assert optima() == [(1, 1, 2, 4), (1, 1, 1, 2)]
     assert [era.learnt_after for era in summary.eras] == [pytest.approx(30, abs=20), pytest.approx(20, abs=20)]
     assert summary.eras[1].success_by_goal == (1.0,) * N_GOALS

@@ -1,5 +1,6 @@
 """What a run's figures mean, by hand-worked cases."""
 
+import msgspec
 import pytest
 
 from learning.errors import RunFolderError
@@ -130,7 +131,7 @@ def test_a_summary_worked_by_hand():
     ]  # fmt: skip
     goals = [choice(epoch, goal=epoch % 2) for epoch in range(200)]
     graphs = [look(40, 3), look(50), look(60, 1), look(100), look(100, 4, rules_epoch=100), look(130), look(140)]
-    summary = summarise(goals, evaluations, graphs, n_goals=2, changes=[100], optima=[(1, 2), (1, 2)])
+    summary = summarise(goals, evaluations, graphs, n_goals=2, n_trials=8, changes=[100], optima=[(1, 2), (1, 2)])
     first, second = summary.eras
     assert (summary.n_epochs, summary.n_trials, summary.n_time_steps) == (200, 400, 2000)
     assert summary.choices_by_goal == (100, 100)
@@ -140,15 +141,24 @@ def test_a_summary_worked_by_hand():
     assert (first.graph_wrong_later, second.graph_wrong_later) == (0.5, 0.0)
     assert second.success_by_goal == (38 / 40, 1.0)
     assert second.trials_by_goal == (1.0, 2.5)
-    assert second.trials_over_optimum == pytest.approx((0.0 + 0.5) / 2)
+    assert second.trials_over_optimum_of_successes == pytest.approx((0.0 + 0.5) / 2)
     # Goal 0: 38 tests of one trial, two failures of eight.
-    assert second.trials_over_optimum_with_failures == pytest.approx(((38 + 16) / 40 - 1 + 0.5) / 2)
+    assert second.trials_over_optimum == pytest.approx(((38 + 16) / 40 - 1 + 0.5) / 2)
+
+
+def test_an_epoch_cut_short_counts_as_one_that_failed():
+    evaluations = [msgspec.structs.replace(row(100), n_void=5)]
+    goals = [choice(epoch) for epoch in range(100)]
+    summary = summarise(goals, evaluations, [], n_goals=1, n_trials=8, changes=[], optima=[(1,)])
+    assert summary.eras[0].success_by_goal == (20 / 25,)
+    assert summary.eras[0].trials_over_optimum == pytest.approx((20 + 40) / 25 - 1)
+    assert summary.eras[0].trials_over_optimum_of_successes == 0.0
 
 
 def test_time_steps_to_all_are_those_before_everything_was_learnt():
     evaluations = [row(50), row(100), row(150)]
     goals = [choice(epoch, steps=epoch) for epoch in range(150)]
-    summary = summarise(goals, evaluations, [], n_goals=1, changes=[], optima=[(1,)])
+    summary = summarise(goals, evaluations, [], n_goals=1, n_trials=8, changes=[], optima=[(1,)])
     assert summary.eras[0].learnt_after == 50
     assert summary.time_steps_to_all == sum(range(50))
 
@@ -156,7 +166,7 @@ def test_time_steps_to_all_are_those_before_everything_was_learnt():
 def test_only_the_last_two_hundred_epochs_of_an_era_count_as_settled():
     evaluations = [row(800, hits=0), row(801, trials=1), row(1000, trials=1)]
     goals = [choice(epoch) for epoch in range(1000)]
-    summary = summarise(goals, evaluations, [], n_goals=1, changes=[], optima=[(1,)])
+    summary = summarise(goals, evaluations, [], n_goals=1, n_trials=8, changes=[], optima=[(1,)])
     assert summary.eras[0].success_by_goal == (1.0,)
 
 
