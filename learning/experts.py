@@ -2,7 +2,8 @@
 
 At each time step candidate moves are rated by the utility that the sub-goal's model expects where the forward model
 says they lead. Before a model has seen enough success, curiosity moves the arm instead, and a goal reached by accident
-gives its own model a trace. Everything here sees P(t), the shaped target and intents; goals are indices.
+gives its own model a trace. Everything here sees P(t), intents, the shaped target (the geometric forward model also
+where things are) and whether the fingers are moving, for a hand at work is no stillness; goals are indices.
 """
 
 from typing import Any

@@ -90,7 +90,7 @@ class SubgoalSelector(Protocol):
 class Experts(Protocol):
     """All experts of a learner, one utility model a goal.
 
-    Sees P(t), the shaped target and intents; goals are indices.
+    Sees P(t), the shaped target, intents and whether the fingers are moving; goals are indices.
     """
 
     def begin_trial(self, subgoal: int, percept: Percept, *, explore: bool) -> None:

@@ -116,10 +116,10 @@ class UtilityModel:
         self._weigh()
 
     def _weigh(self) -> None:
-        """Tell relevance anew while successes are few, later now and then where the model fails.
+        """Tell relevance anew while successes are few, later at every twentieth success where the model fails.
 
         New weights are a new meaning of every input: a model that works keeps those it was trained with, however seldom
-        it was tried, and one that does not is trained with them at once.
+        it was tried; one that is given new ones is trained with them at once.
         """
         n = self.n_successes
         is_early = n <= self._config.relevance_until

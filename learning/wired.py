@@ -2,12 +2,14 @@
 
 from collections.abc import Sequence
 from pathlib import Path
+from time import perf_counter
 
 import typer
 from rich.console import Console
 
 from config.errors import ConfigError
 from learning.errors import LearningError
+from learning.progress import Status
 from learning.rows import EvaluationRow
 from learning.run_folder import RunFolder
 from robot.bench import BenchResult
@@ -37,8 +39,8 @@ def success_rows(run: Path, *, rig: Path, n_tests: int) -> list[BenchResult]:
     try:
         goals = [goal.name for goal in folder.manifest().goals]
         console.print(f"{len(goals)} goals, {n_tests} test epochs each, 4 to 8 s a test epoch")
-        with console.status("connecting") as status:
-            rows = assess(folder, n_tests=n_tests, seed=None, rules_epoch=None, rig=str(rig), tell=status.update)
+        with Status("connecting", now_s=perf_counter, console=console) as status:
+            rows = assess(folder, n_tests=n_tests, seed=None, rules_epoch=None, rig=str(rig), tell=status)
     except (LearningError, ConfigError) as error:
         raise typer.BadParameter(str(error), param_hint="RUN") from error
     return success_results(rows, goals)

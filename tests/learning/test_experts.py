@@ -1,5 +1,7 @@
 import json
+import math
 
+import msgspec
 import numpy as np
 import pytest
 
@@ -124,3 +126,36 @@ def test_utility_is_a_probability(practised):
     percept = practised.table.reset(seed=3, epoch=0)
     utilities = [practised.experts.utility(g, percept) for g in range(N_GOALS)]
     assert all(0.0 <= u <= 1.0 for u in utilities), json.dumps(utilities)
+
+
+def blinded(percept):
+    """The same P(t) and the same word on the fingers; everything else is garbage."""
+    nowhere = (math.nan, math.nan, math.nan)
+    grip = msgspec.structs.replace(percept.grip, opening_m=math.nan, has_object=not percept.grip.has_object)
+    return msgspec.structs.replace(
+        percept, objects=(), tcp_position_m=nowhere, grip=grip, is_in_contact=not percept.is_in_contact
+    )
+
+
+def test_with_a_learned_forward_model_experts_see_p_and_whether_the_fingers_move_and_nothing_else():
+    table = KinematicTable(load_scenario("paper"))
+    seeing, blind = (
+        ExpertSet(load_learning("learned"), table.spec, n_goals=N_GOALS, rng=np.random.default_rng(3)) for _ in range(2)
+    )
+    for trial in range(6):
+        percept = table.reset(seed=trial, epoch=0)
+        dark = blinded(percept)
+        seeing.begin_trial(trial % N_GOALS, percept, explore=True)
+        blind.begin_trial(trial % N_GOALS, dark, explore=True)
+        for _ in range(STEPS):
+            intent = seeing.act(percept)
+            assert blind.act(dark) == intent
+            result = table.step(intent)
+            percept, dark = result.percept, blinded(result.percept)
+            executed = msgspec.structs.replace(result.executed, target_m=(math.nan, math.nan, math.nan))
+            seeing.observe(result, table.achieved())
+            blind.observe(msgspec.structs.replace(result, percept=dark, executed=executed), table.achieved())
+        outcome = TrialOutcome.ACHIEVED if table.achieved()[trial % N_GOALS] else TrialOutcome.NOT_REACHED
+        seeing.end_trial(outcome)
+        blind.end_trial(outcome)
+    assert frozen(seeing) == frozen(blind)

@@ -22,12 +22,23 @@ LIDS = ("red_box", "square_box", "blue_box")
 PROTOCOL = {"epochs": EPOCHS, "evaluate_every": EPOCHS, "test_epochs": 10, "checkpoint_every": EPOCHS}
 
 
+def draw_rules(rng: np.random.Generator) -> list[dict]:
+    """Return rules of up to two literals a lid, an AND and a NOT among them and no two alike."""
+    while True:
+        rules = []
+        for lid in LIDS:
+            inputs = sorted(rng.choice(BUTTONS, size=rng.integers(0, 3), replace=False))
+            literals = [{"input": str(i), "is_on": bool(rng.random() < 0.6)} for i in inputs]
+            rules.append({"output": lid, "when": literals})
+        whens = [rule["when"] for rule in rules]
+        has_and, has_not = max(map(len, whens)) > 1, not all(literal["is_on"] for when in whens for literal in when)
+        if has_and and has_not and all(whens[i] != whens[j] for i, j in ((0, 1), (0, 2), (1, 2))):
+            return rules
+
+
 def draw_scenario(folder: Path, rng: np.random.Generator) -> Path:
-    """Write the paper's table with rules drawn at random (up to two literals a lid) and its distances shuffled."""
-    rules = []
-    for lid in LIDS:
-        inputs = rng.choice(BUTTONS, size=rng.integers(0, 3), replace=False)
-        rules.append({"output": lid, "when": [{"input": str(i), "is_on": bool(rng.random() < 0.6)} for i in inputs]})
+    """Write the paper's table with rules drawn at random and its distances shuffled."""
+    rules = draw_rules(rng)
     (folder / "drawn.yaml").write_text(dump_yaml({"name": "drawn", "rules": rules}))
     scenario = parse_yaml((ROOT / "config" / "scenarios" / "paper.yaml").read_text(), "paper.yaml")
     scenario["distances"] = [str(name) for name in rng.permutation(scenario["distances"])]
