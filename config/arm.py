@@ -74,7 +74,8 @@ class MotionLimits(Section, frozen=True, kw_only=True):
     step_s: Annotated[float, Meta(ge=0.01, le=1.0)] = 0.05
     max_step_m: Annotated[float, Meta(gt=0.0, le=0.1)] = 0.022
     leash_m: Span = 0.09
-    """How far the target may run ahead of the measured tool."""
+    """How far the target may run ahead of where a free tool is by now, or, where the measured tool is clearly somewhere
+    else, of that one."""
     guard_height_m: Span = 0.18
     """Below this height over the table the tool moves at guarded speed."""
     guarded_speed_m_s: Annotated[float, Meta(gt=0.0, le=0.5)] = 0.25

@@ -17,6 +17,7 @@ __all__ = ["RESERVED_NAMES", "check_arm", "check_learning", "check_rig", "check_
 
 RESERVED_NAMES = ("table", "gripper", "hand", "tool", "world")
 """Names that mean something by themselves in distances, rules or the simulated world."""
+ROUNDING_M = 1e-9
 CAP_M = 0.015
 """Height of a button's cap and of the ring that holds it."""
 
@@ -95,6 +96,13 @@ def _check_motion(arm: ArmConfig, checker: _Checker) -> None:
     for axis in range(3):
         checker.ascending((low[axis], high[axis]), f"motion.workspace_m[1][{axis}]")
     checker.ascending(motion.heights_m, "motion.heights_m")
+    roof_m = low[2] + motion.heights_m[1] - motion.heights_m[0]
+    checker.need(
+        high[2] >= roof_m - ROUNDING_M,
+        "motion.workspace_m[1][2]",
+        f"at least {roof_m:g}, so that both heights_m lie within",
+        f"{high[2]:g}",
+    )
     tip_m = motion.heights_m[0] - arm.tool.tip_below_tcp_m
     checker.need(
         tip_m >= motion.table_clearance_m,
@@ -187,6 +195,7 @@ def check_scenario(scenario: Scenario, file: str) -> None:
         checker.need(is_high, f"buttons[{i}].height_m", f"at least {least_m:g}, cap and travel", f"{button.height_m:g}")
     for i, goal in enumerate(scenario.goals):
         _check_goal(goal, scenario, f"goals[{i}]", checker)
+    _check_seen(scenario, checker)
     if scenario.workspace_m is not None:
         for axis, pair in enumerate(zip(*scenario.workspace_m, strict=True)):
             checker.ascending(pair, f"workspace_m[1][{axis}]")
@@ -231,6 +240,13 @@ def _check_distances(scenario: Scenario, checker: _Checker) -> None:
     for i, name in enumerate(scenario.distances):
         checker.known(name, [*things, "table"], f"distances[{i}]", "an object or table")
     checker.unique(((f"distances[{i}]", name) for i, name in enumerate(scenario.distances)), "a distance")
+
+
+def _check_seen(scenario: Scenario, checker: _Checker) -> None:
+    named = dict.fromkeys(name for goal in scenario.goals for name in (goal.object, goal.box) if name is not None)
+    missing = [name for name in named if name not in scenario.distances]
+    expected = f"every object that a goal names, since the learner is blind to others: {', '.join(named)}"
+    checker.need(not missing, "distances", expected, f"none to {', '.join(missing)}")
 
 
 def _check_goal(goal: Goal, scenario: Scenario, where: str, checker: _Checker) -> None:

@@ -23,6 +23,12 @@ Width = Annotated[int, Meta(ge=1, le=4096)]
 Error = Annotated[float, Meta(ge=1e-6, le=0.5)]
 """A chance of being misled: never none, or one contrary attempt would leave no belief at all."""
 Rate = Annotated[float, Meta(gt=0.0, le=1.0)]
+LearningRate = Annotated[float, Meta(ge=1e-6, le=0.1)]
+"""Networks trained with more than this run off to no number."""
+Part = Annotated[float, Meta(ge=0.0, lt=1.0)]
+"""A share that leaves something: a belief that is all given up is none."""
+Many = Annotated[int, Meta(ge=1, le=10_000)]
+"""Every one of these is compared with others in one time step."""
 
 
 class GoalSelection(Section, frozen=True, kw_only=True):
@@ -63,12 +69,12 @@ class SubgoalSelection(Section, frozen=True, kw_only=True):
     gamma: Share = 0.6
     dyna_replays: Annotated[int, Meta(ge=0, le=10_000)] = 20
     dyna_buffer: Count = 200
-    max_literals: Annotated[int, Meta(ge=0, le=4)] = 3
-    literal_cost: NonNegative = 1.2
+    max_literals: Annotated[int, Meta(ge=1, le=4)] = 3
+    literal_cost: Annotated[float, Meta(ge=0.0, le=20.0)] = 1.2
     """Prior of a conjunction is exp(-cost * literals)."""
-    hazard: Share = 0.01
+    hazard: Part = 0.01
     """Chance per attempt that the preconditions have changed: the change detector."""
-    local_change: Share = 0.5
+    local_change: Part = 0.5
     """Share of those changes that are of one literal (one more, one fewer, turned round, exchanged); the others draw
     the preconditions anew."""
     false_positive: Error = 0.02
@@ -93,7 +99,7 @@ class Expert(Section, frozen=True, kw_only=True):
     """The utility model of one goal."""
 
     hidden: Annotated[tuple[Width, ...], Meta(min_length=1, max_length=4)] = (64, 64)
-    learning_rate: Positive = 1e-3
+    learning_rate: LearningRate = 1e-3
     batch: Count = 128
     updates_per_trial: Annotated[int, Meta(ge=0, le=10_000)] = 20
     trace: Count = 70
@@ -109,7 +115,7 @@ class Expert(Section, frozen=True, kw_only=True):
     """Time steps at the end of a failed trial that are learnt as worthless."""
     failure_weight: NonNegative = 4.0
     """How much more often a failed step is drawn than a successful one, up to failure_share of a batch."""
-    expectile: Share = 0.8
+    expectile: Annotated[float, Meta(gt=0.0, lt=1.0)] = 0.8
     """Above 0.5, better traces through a place count for more than worse ones."""
     boredom: NonNegative = 0.004
     """Utility taken off places like those of the trial's steps, for each; more where nothing moved."""
@@ -129,11 +135,11 @@ class Expert(Section, frozen=True, kw_only=True):
 class Novelty(Section, frozen=True, kw_only=True):
     """Exploration before there is something to exploit: go where P(t) is unlike the recent past."""
 
-    memory: Count = 200
+    memory: Many = 200
     temperature: Positive = 0.05
     near_only: bool = False
     """Only how near things are can be new; all that is far looks alike. For a model that does not know the fences."""
-    wishes: Count = 512
+    wishes: Many = 512
     """Places compared when a new wish is made."""
     reach_m: Span = 0.5
     """How far off a wish may be."""
@@ -148,7 +154,7 @@ class ForwardModel(Section, frozen=True, kw_only=True):
     hidden: Annotated[tuple[Width, ...], Meta(min_length=1, max_length=4)] = (64, 64)
     history: Annotated[int, Meta(ge=1, le=64)] = 20
     """Time steps from which it is told what comes along with the hand."""
-    learning_rate: Positive = 1e-3
+    learning_rate: LearningRate = 1e-3
     batch: Count = 64
     updates_per_trial: Annotated[int, Meta(ge=0, le=10_000)] = 30
     rate_half: Positive = 200.0
@@ -159,7 +165,7 @@ class ForwardModel(Section, frozen=True, kw_only=True):
 class Actions(Section, frozen=True, kw_only=True):
     """Candidate moves rated at each time step."""
 
-    n_headings: Count = 20
+    n_headings: Annotated[int, Meta(ge=3, le=360)] = 20
     distance_shares: Annotated[tuple[Share, ...], Meta(min_length=1, max_length=8)] = (1.0, 0.35)
     """Step lengths as shares of the longest step."""
 

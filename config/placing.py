@@ -19,6 +19,8 @@ from config.scenario import Box, Cylinder, Scenario
 __all__ = ["check_fit", "check_placing"]
 
 ROUNDING_M = 1e-9
+LID_SLACK_M = 0.002
+"""What stands in a box must be lower than a lid that shuts over it by at least this."""
 JAW_SLACK_M = 0.005
 """The open jaws must be wider than what they take by at least this on either side."""
 
@@ -92,11 +94,23 @@ def _check_inside(scenario: Scenario, file: str) -> None:
         if beyond_m > ROUNDING_M:
             expected = f"a place within {box.name} in every draw"
             raise ConfigError(file, f"cylinders[{i}].position_m", expected, f"{_mm(beyond_m)} beyond its inside")
+    for i, cylinder in enumerate(scenario.cylinders):
+        for name in (cylinder.inside, cylinder.receptacle):
+            _check_under_lid(i, cylinder, boxes.get(name or ""), file)
     for (i, a, box_a), (k, b, box_b) in itertools.combinations(inside, 2):
         if box_a is box_b:
             _check_apart(
                 (f"cylinders[{i}]", footprint_of_cylinder(a)), (f"cylinders[{k}]", footprint_of_cylinder(b)), file
             )
+
+
+def _check_under_lid(i: int, cylinder: Cylinder, box: Box | None, file: str) -> None:
+    if box is None or box.lid is None:
+        return
+    most_m = box.height_m - LID_SLACK_M
+    if cylinder.height_m > most_m + ROUNDING_M:
+        expected = f"at most {most_m:g}, so that the lid of {box.name} shuts over it"
+        raise ConfigError(file, f"cylinders[{i}].height_m", expected, f"{cylinder.height_m:g}")
 
 
 def _check_names(scenario: Scenario, arm: ArmConfig, file: str) -> None:
@@ -110,11 +124,6 @@ def _check_names(scenario: Scenario, arm: ArmConfig, file: str) -> None:
 
 def _check_start(scenario: Scenario, arm: ArmConfig, file: str) -> None:
     low, high = arm.motion.workspace_m
-    lowest, travel = (scenario.table.height_m + h for h in arm.motion.heights_m)
-    if lowest < low[2] - ROUNDING_M or travel > high[2] + ROUNDING_M:
-        least, most = low[2] - arm.motion.heights_m[0], high[2] - arm.motion.heights_m[1]
-        expected = f"{least:g} to {most:g}, so that the arm reaches down to the table and clears it"
-        raise ConfigError(file, "table.height_m", expected, f"{scenario.table.height_m:g}")
     for axis in range(3):
         centre, spread = scenario.start.position_m[axis], scenario.start.spread_m[axis]
         least, most = low[axis], high[axis]

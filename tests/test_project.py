@@ -1,8 +1,12 @@
 """The project as a whole: packages, public names, sub-commands, pins."""
 
 import importlib
+import os
 import pkgutil
 import re
+import shutil
+import subprocess
+import sys
 import tomllib
 from importlib.metadata import entry_points
 from pathlib import Path
@@ -13,6 +17,15 @@ import typer
 ROOT = Path(__file__).parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
 ROOMS = ("config", "learning", "perception", "robot", "sim_twin")
+EDGES = {
+    "agent", "assembly", "assess", "bench", "checkpoint", "cli", "consent", "ended", "errors", "evaluation",
+    "evaluation_pool", "experiment", "explain", "figures", "goals", "metrics", "progress", "provenance", "report",
+    "robot_hours", "rows", "run_folder", "seeds", "session", "stop_request", "stopwatch", "tables", "telling", "wanted",
+    "wired",
+}  # fmt: skip
+"""Modules of learning that hold nothing learnt: what runs the learner, judges it, keeps it or tells of it."""
+OWN_KEYS = {"config.learning", "config.values"}
+"""All that what is learnt may read of the config."""
 LISTED = PROJECT["tool"]["setuptools"]["packages"]
 
 
@@ -42,7 +55,13 @@ def test_the_packages_of_the_wheel_are_those_on_disk():
 def test_every_folder_of_config_data_is_package_data():
     patterns = PROJECT["tool"]["setuptools"]["package-data"]["config"]
     folders = {path.parent.name for path in (ROOT / "config").glob("*/*.yaml")}
-    assert {f"{folder}/*.yaml" for folder in folders} == set(patterns)
+    assert {f"{folder}/*.yaml" for folder in folders} == {pattern for pattern in patterns if "/" in pattern}
+
+
+@pytest.mark.parametrize("room", ROOMS)
+def test_every_room_says_that_it_is_typed(room):
+    assert (ROOT / room / "py.typed").is_file()
+    assert "py.typed" in PROJECT["tool"]["setuptools"]["package-data"][room]
 
 
 @pytest.mark.parametrize("name", [*LISTED, *modules()])
@@ -93,3 +112,47 @@ def test_every_dependency_is_pinned():
     ]
     pinned = {pin.split("==")[0].lower().replace("_", "-") for pin in pins()}
     assert {re.split(r"[\[<>=]", name)[0].lower().replace("_", "-") for name in wanted} <= pinned
+
+
+def fence():
+    contracts = PROJECT["tool"]["importlinter"]["contracts"]
+    return next(c for c in contracts if c["name"] == "what is learnt cannot read what it should find out")
+
+
+def test_every_module_of_learning_is_fenced_or_named_an_edge():
+    on_disk = {name for name in modules() if name.startswith("learning.")}
+    edges = {f"learning.{name}" for name in EDGES}
+    fenced = set(fence()["source_modules"])
+    assert not fenced & edges
+    assert fenced | edges == on_disk
+
+
+def test_what_is_learnt_may_read_nothing_of_the_config_but_its_own_keys():
+    on_disk = {name for name in modules() if name.startswith("config.")}
+    assert {name for name in fence()["forbidden_modules"] if name.startswith("config.")} == on_disk - OWN_KEYS
+    assert not fence().keys() & {"ignore_imports", "allow_indirect_imports"}
+
+
+@pytest.mark.parametrize(
+    ("module", "line", "is_kept"),
+    [
+        ("novelty", "", True),
+        ("novelty", "from config.sources import read_source", False),
+        ("controls", "from config.yaml_text import parse_yaml", False),
+        ("networks", "from learning.errors import LearningError", True),
+        ("networks", "from learning.wanted import resolve_wanted", False),
+        ("replay", "from robot.bus import TRUTH", False),
+    ],
+)
+def test_the_fence_holds_what_it_says(tmp_path, module, line, is_kept):
+    for room in ROOMS:
+        shutil.copytree(ROOT / room, tmp_path / room, ignore=shutil.ignore_patterns("__pycache__", "*.yaml"))
+    shutil.copy(ROOT / "pyproject.toml", tmp_path)
+    with (tmp_path / "learning" / f"{module}.py").open("a", encoding="utf-8") as file:
+        file.write(f"\n{line}\n")
+    result = subprocess.run(
+        [Path(sys.executable).parent / "lint-imports", "--no-cache"],
+        cwd=tmp_path, env={**os.environ, "PYTHONPATH": str(tmp_path)}, capture_output=True, text=True, timeout=60,
+    )  # fmt: skip
+    assert (result.returncode == 0) is is_kept, result.stdout + result.stderr
+    assert is_kept or f"{fence()['name']} BROKEN" in result.stdout

@@ -72,6 +72,7 @@ def test_the_wheel_holds_the_rooms_their_data_and_the_licence_and_nothing_else(w
     }
     modules = {str(path.relative_to(ROOT)) for room in ROOMS for path in (ROOT / room).rglob("*.py")}
     assert {name for name in names if name.endswith(".py")} == modules
+    assert {name for name in names if name.endswith("py.typed")} == {f"{room}/py.typed" for room in ROOMS}
     assert any(name.endswith("licenses/LICENSE") for name in names)
 
 

@@ -117,19 +117,26 @@ def guard(at_m: Vec3, step_m: Vec3, limits: TargetLimits, duration_s: float) -> 
     return (x, y, z), is_slowed
 
 
-def fence(target_m: Vec3, measured_m: Vec3, limits: TargetLimits) -> Shaped:
-    """Keep the target inside the workspace and within the leash of the measured tool."""
+def fence(target_m: Vec3, tool_m: Vec3, limits: TargetLimits) -> Shaped:
+    """Keep the target inside the workspace and within the leash of the tool.
+
+    Args:
+        target_m: where the target would go, base frame.
+        tool_m: what the leash is held at: where a free tool is by now, or the measured tool where it has strayed from
+            that (mover.STRAY_M).
+        limits: workspace and leash.
+    """
     names: list[str] = []
     (x0, y0, z0), (x1, y1, z1) = limits.workspace_m
     x, y, z = target_m
     inside = (min(max(x, x0), x1), min(max(y, y0), y1), min(max(z, z0), z1))
     if inside != target_m:
         names.append("workspace")
-    away = math.dist(inside, measured_m)
+    away = math.dist(inside, tool_m)
     if away > limits.leash_m:
         share = limits.leash_m / away
         x, y, z = inside
-        mx, my, mz = measured_m
+        mx, my, mz = tool_m
         inside = (mx + (x - mx) * share, my + (y - my) * share, mz + (z - mz) * share)
         names.append("leash")
     return Shaped(inside, tuple(names))

@@ -2,8 +2,11 @@
 
 Whoever resets the table of a cell also looks after an arm that has stopped: a protective stop is unlocked, when five
 seconds have passed since, and the program that it interrupted is ended, before the table is laid out. Other stops stay.
-A reset waits a second for a program that is ending and an arm that is coming to rest.
+A reset waits a second for a program that is ending and an arm that is coming to rest. What is no reset request is
+answered with an error before anything else: it unlocks and ends nothing.
 """
+
+from typing import NamedTuple
 
 import msgspec
 import zenoh
@@ -21,6 +24,11 @@ TRUTH_SLICES = 5
 N_WAITING = 8
 PATIENCE_SLICES = 500
 """How long a program may take to end, and the arm to come to rest, once a reset was asked for."""
+
+
+class _Reset(NamedTuple):
+    query: zenoh.Query
+    request: ResetRequest
 
 
 class BusPort:
@@ -48,7 +56,7 @@ class BusPort:
         self._actions = self._session.declare_queryable(self._cell_key, zenoh.handlers.FifoChannel(N_WAITING))
         self._hands = TableHands(robot.machine.world)
         self._n_patience = 0
-        self._asked: zenoh.Query | None = None
+        self._asked: _Reset | None = None
         """A reset that waits for the arm to be unlocked, or to come to rest."""
         self._encode = msgspec.json.Encoder().encode
 
@@ -59,11 +67,11 @@ class BusPort:
 
     def tick(self, n_slices: int) -> None:
         """Answer what was asked, and publish when it is time."""
-        query, self._asked = self._asked, None
-        if query is None:
-            query, self._n_patience = self._queries.try_recv(), PATIENCE_SLICES
-        if query is not None:
-            self._answer(query)
+        reset, self._asked = self._asked, None
+        if reset is None:
+            reset, self._n_patience = self._next_reset(), PATIENCE_SLICES
+        if reset is not None:
+            self._answer(reset)
         action = self._actions.try_recv()
         if action is not None:
             self._act(action)
@@ -77,23 +85,35 @@ class BusPort:
     def _read(self) -> SceneState:
         return self._truth.read()
 
-    def _answer(self, query: zenoh.Query) -> None:
+    def _next_reset(self) -> _Reset | None:
+        """Return what was asked next, None where nothing was or where it was garbage, which is answered here."""
+        query = self._queries.try_recv()
+        if query is None:
+            return None
+        try:
+            return _Reset(query, msgspec.json.decode(_payload(query), type=ResetRequest))
+        except (msgspec.DecodeError, ValueError) as error:
+            with query:
+                query.reply_err(f"reset: {error}")
+            return None
+
+    def _answer(self, reset: _Reset) -> None:
         robot, modes = self._robot, self._robot.machine.modes
         if modes.is_stopped_by_safety:
             if robot.panel.unlock_protective_stop() is Outcome.TOO_EARLY:
-                self._asked = query
+                self._asked = reset
                 return
             robot.panel.stop()
             self._n_patience = PATIENCE_SLICES
         if self._n_patience and not robot.is_idle:
-            self._asked = query
+            self._asked = reset
             self._n_patience -= 1
             return
+        query, asked = reset
         with query:
             try:
-                asked = msgspec.json.decode(_payload(query), type=ResetRequest)
                 robot.lay_out(seed=asked.seed, epoch=asked.epoch, digital_out=asked.digital_out)
-            except (msgspec.DecodeError, ValueError) as error:
+            except ValueError as error:
                 query.reply_err(f"reset: {error}")
             else:
                 self._hands.let_go()

@@ -77,6 +77,16 @@ ARMS = [
     case("capsule without length", "arm", ["capsules", 0, "to_m"], [0, 0, 0], "capsules[0].to_m", "another point", "the same point"),
     case("ticks", "rig", ["physics_s"], 0.003, "physics_s", "a whole part of tick_s = 0.01", "0.003"),
     case("no step length", "learning", ["actions"], {"distance_shares": [0]}, "actions.distance_shares", "above 0", "only 0"),
+    case("workspace too flat", "arm", ["motion"], {"workspace_m": [[0.24, -0.4, 0.1], [0.64, 0.4, 0.25]]}, "motion.workspace_m[1][2]", "at least 0.3, so that both heights_m", "0.25"),
+    case("no literals", "learning", ["subgoal_selection", "max_literals"], 0, "subgoal_selection.max_literals", "a whole number from 1 up to 4", "0"),
+    case("certain change", "learning", ["subgoal_selection", "hazard"], 1, "subgoal_selection.hazard", "a number from 0 below 1", "1"),
+    case("only local changes", "learning", ["subgoal_selection", "local_change"], 1.0, "subgoal_selection.local_change", "a number from 0 below 1", "1"),
+    case("impossible literals", "learning", ["subgoal_selection", "literal_cost"], 1e6, "subgoal_selection.literal_cost", "up to 20", "1000000"),
+    case("headings without number", "learning", ["actions"], {"n_headings": 1_000_000}, "actions.n_headings", "a whole number from 3 up to 360", "1000000"),
+    case("two headings", "learning", ["actions"], {"n_headings": 2}, "actions.n_headings", "from 3 up to 360", "2"),
+    case("wishes without number", "learning", ["novelty"], {"wishes": 1_000_000}, "novelty.wishes", "from 1 up to 10000", "1000000"),
+    case("learning rate", "learning", ["expert"], {"learning_rate": 10.0}, "expert.learning_rate", "up to 0.1", "10"),
+    case("expectile", "learning", ["expert"], {"expectile": 1.0}, "expert.expectile", "above 0 below 1", "1"),
     case("batch", "learning", ["expert"], {"buffer_steps": 8}, "expert.batch", "at most buffer_steps = 8", "128"),
 ]  # fmt: skip
 
@@ -112,6 +122,15 @@ SCENARIOS = [
     case("off the table", "scenario", ["buttons", 1, "position_m"], [0.0, 0.0], "buttons[1].position_m", "on the table", "36 mm beyond it"),
     case("outside its box", "scenario", ["cylinders", 0, "position_m"], [0.06, 0], "cylinders[0].position_m", "within red_box", "12 mm beyond"),
     case("two in one place", "scenario", ["cylinders", 2], CYLINDER | {"inside": "red_box", "position_m": [0, 0]}, "cylinders[2].position_m", "clear of cylinders[0]", "an overlap"),
+    case("taller than its lidded box", "scenario", ["cylinders", 0, "height_m"], 0.08, "cylinders[0].height_m", "at most 0.073, so that the lid of red_box shuts", "0.08"),
+    case("taller than its lidded receptacle", "scenario", ["boxes", 1, "height_m"], 0.06, "cylinders[1].height_m", "at most 0.058, so that the lid of square_box shuts", "0.06"),
+    case("blind to a goal's object", "scenario", ["distances", 6], ..., "distances", "every object that a goal names", "none to red_cylinder"),
+    case("blind to a goal's box", "scenario", ["distances", 4], ..., "distances", "every object that a goal names", "none to square_box"),
+    case("blind to all but the table", "scenario", ["distances"], ["table"], "distances", "orange_button, green_button", "none to orange_button"),
+    case("slow lid", "scenario", ["boxes", 0, "lid", "speed_rad_s"], 0.001, "boxes[0].lid.speed_rad_s", "a number from 0.2 up to 2", "0.001"),
+    case("weak lid", "scenario", ["boxes", 0, "lid", "force_n"], 0.01, "boxes[0].lid.force_n", "a number from 0.5 up to 5", "0.01"),
+    case("slippery", "scenario", ["cylinders", 0, "friction"], 1e-9, "cylinders[0].friction", "a number from 0.05 up to 3", "1e-09"),
+    case("heavy", "scenario", ["cylinders", 0, "mass_kg"], 50, "cylinders[0].mass_kg", "a number from 0.01 up to 3", "50"),
     case("unreachable goal", "scenario", ["reflexes"], {"open_over_receptacle": False}, "schedule[0].rules", "every goal can be reached", "paper_before, under which blue_in_square_box cannot"),
 ]  # fmt: skip
 
@@ -173,14 +192,17 @@ def test_rules_that_do_not_fit_their_scenario_are_told_in_the_rules_file(tmp_pat
         (["cylinders", 0, "diameter_m"], 0.08, "cylinders[0].diameter_m", "what the open jaws take", "0.08"),
         (["cylinders", 0, "height_m"], 0.02, "cylinders[0].height_m", "more than the tool's lowest height", "0.02"),
         (["cylinders", 0, "spread_m"], [0.02, 0.05], "cylinders[0].spread_m[1]", "the open hand finds room", "0.05"),
+        (["workspace_m", 0, 2], 0.2, "workspace_m[0][2]", "0.015 to 0.025, the tool's lowest height over this table", "0.2"),
+        (["workspace_m", 1, 2], 0.03, "workspace_m[1][2]", "0.225, the tool's travel height over this table, to 0.32", "0.03"),
+        (["table"], {"height_m": 0.2}, "table.height_m", "-0.01 to 0.095, so that the arm reaches down", "0.2"),
+        (["table"], {"height_m": -0.1}, "table.height_m", "-0.01 to 0.095", "-0.1"),
         (["boxes", 0, "height_m"], 0.15, "boxes[0].height_m", "below the fingertips at travel height", "0.2425"),
     ],
 )  # fmt: skip
 def test_a_scenario_that_does_not_suit_the_arm_is_refused_when_they_meet(tmp_path, path, value, where, expected, got):
     tree = shipped_tree("scenarios", "paper")
-    tree["distances"] = ["table"]
     if path == ["buttons", 0, "name"]:
-        tree["goals"][0]["object"] = "elbow"
+        tree["goals"][0]["object"] = tree["distances"][0] = "elbow"
         tree["schedule"] = [{"from_epoch": 0, "rules": "paper_before"}]
     put(tree, path, value)
     file = write(tmp_path, "scenario.yaml", tree)

@@ -2,9 +2,11 @@
 
 import math
 
+import msgspec
 import numpy as np
 import pytest
 
+from config.learning import SubgoalSelection
 from learning.preconditions import START, Belief, Evidence, Kind, Needs, Situation, conjunctions, mask, one_change_apart
 
 ACHIEVED, BLOCKED, MISSED = Kind.ACHIEVED, Kind.BLOCKED, Kind.MISSED
@@ -182,3 +184,18 @@ def test_a_belief_survives_ten_thousand_contrary_surprises_without_losing_its_su
 
 def test_a_mask_has_bit_i_for_goal_i():
     assert mask((True, False, True)) == 0b101
+
+
+@pytest.mark.parametrize("n_goals", [1, 2, 4])
+@pytest.mark.parametrize("literal_cost", [0.0, 20.0])
+def test_a_belief_stays_one_at_the_ends_of_what_the_config_admits(n_goals, literal_cost):
+    almost = float(np.nextafter(1.0, 0.0))
+    for hazard, local in ((0.0, 0.0), (almost, 0.0), (0.0, almost), (almost, almost)):
+        keys = {"max_literals": 1, "literal_cost": literal_cost, "hazard": hazard, "local_change": local}
+        config = msgspec.convert(keys, SubgoalSelection)
+        b = belief(n_goals=n_goals, goal=0, max_literals=config.max_literals, literal_cost=config.literal_cost)
+        for _ in range(5):
+            b.expect_change(config.hazard, local=config.local_change)
+            b.update(seen(BLOCKED, START), block_hit=SURE)
+        assert b.probabilities.sum() == pytest.approx(1.0)
+        assert 0.0 < b.predict_success(START) <= 1.0

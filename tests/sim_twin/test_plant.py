@@ -1,11 +1,13 @@
 from pathlib import Path
 
+import msgspec
 import mujoco
 import numpy as np
 import pytest
 
 from config.loader import resolve
 from config.resolved import Resolved
+from config.scenario import Scenario
 from robot.layout import draw_layout
 from robot.messages import ArmCommand, GripCommand
 from sim_twin.names import on_table
@@ -97,6 +99,23 @@ def test_lids_open_gently_stay_open_and_lock_only_when_shut(plant, resolved):
             assert not data.eq_active[locks].any() or out == 0
         assert [float(a[0]) for a in angles] == pytest.approx([angle] * 6, abs=0.03)
     assert 1.0 < fastest <= 2.0
+
+
+def test_the_slowest_and_weakest_lids_that_a_scenario_may_have_open_within_half_an_epoch(resolved):
+    weakest = {"speed_rad_s": 0.2, "force_n": 0.5, "open_angle_rad": 2.6}
+    tree = msgspec.to_builtins(resolved.scenario)
+    for box in tree["boxes"]:
+        box["lid"] |= weakest
+    scenario = msgspec.convert(tree, Scenario)
+    plant = make(msgspec.structs.replace(resolved, scenario=scenario))
+    plant.resetter.reset(seed=0, epoch=0, digital_out=0)
+    plant.world.digital_out = LIDS
+    experiment, motion = resolved.learning.experiment, resolved.arm.motion
+    epoch_s = experiment.trials * experiment.steps * motion.step_s
+    for _ in range(round(epoch_s / 2 / resolved.rig.tick_s)):
+        plant.world.advance()
+    leaves = [plant.world.data.joint(on_table(b.name, f"leaf_{s}")) for b in scenario.boxes for s in ("near", "far")]
+    assert [float(leaf.qpos[0]) for leaf in leaves] == pytest.approx([2.6] * 6, abs=0.03)
 
 
 def test_a_lid_pushes_no_harder_than_its_drive(plant, resolved):

@@ -10,12 +10,14 @@ import pytest
 
 from robot.bus import RESET, ResetRequest, open_session, topic
 from sim_twin.controller.bus_port import PATIENCE_SLICES, BusPort
-from sim_twin.controller.states import RuntimeState
+from sim_twin.controller.states import Event, RuntimeState
 from tests.support.virtual_robot import make_robot, run
 
 MOVES = "def f():\n q = get_actual_joint_positions()\n q[0] = q[0] + 0.2\n movej(q, a=8, v=2)\nend\n"
 FOREVER = "def waits():\n  while True:\n    sync()\n  end\nend\n"
 SLICES_AT_MOST = 1500
+UNLOCKABLE_SLICES = 2600
+RESET_3 = msgspec.json.encode(ResetRequest(seed=3, epoch=1, digital_out=0))
 
 
 class Cell:
@@ -36,10 +38,9 @@ class Cell:
     def runtime(self):
         return self.robot.machine.modes.runtime
 
-    def ask(self):
+    def ask(self, payload=RESET_3):
         """Ask, and let slices pass once the port has the question; return what came and after how many slices."""
         replies = SimpleQueue()
-        payload = msgspec.json.encode(ResetRequest(seed=3, epoch=1, digital_out=0))
         self.asker.get(self.key, replies.put, payload=payload, timeout=20.0)
         end = time.monotonic() + 10.0
         while not self.port.is_waiting and replies.empty():
@@ -103,3 +104,19 @@ def test_a_reset_does_not_outwait_a_program_that_goes_on_and_leaves_it_alone(cel
 def test_each_reset_has_its_own_patience(cell):
     cell.start(FOREVER)
     assert [cell.ask()[1] for _ in range(2)] == [PATIENCE_SLICES] * 2
+
+
+def test_what_is_no_reset_request_is_refused_and_neither_unlocks_a_stop_nor_ends_a_program(cell):
+    cell.start(FOREVER)
+    cell.robot.programs.handle(Event.PROTECTIVE_STOP)
+    run(cell.robot, UNLOCKABLE_SLICES)
+    modes = cell.robot.machine.modes
+    before = (modes.safety, modes.runtime)
+    for garbage in (b"", b"reset", b"[1, 2]", b'{"seed": "three", "epoch": 0, "digital_out": 0}', b"\xff\xfe"):
+        reply, n = cell.ask(garbage)
+        assert "reset: " in reply.err.payload.to_string()
+        assert n == 0
+        assert (modes.safety, modes.runtime) == before
+        assert modes.is_stopped_by_safety
+    assert cell.ask()[0].ok is not None
+    assert not modes.is_stopped_by_safety
