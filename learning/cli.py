@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, ParamSpec, TypeVar
 import msgspec
 import typer
 from rich.console import Console
+from rich.text import Text
 
 from learning.consent import Consent
 from learning.ended import Ended
@@ -192,9 +193,9 @@ def _write_figures(runs: list[Run], folder: Path) -> list[Path]:
 def _tell(run: Run, ended: Ended) -> None:
     console = Console()
     for line in summary_lines(run):
-        console.print(line, highlight=False, soft_wrap=True)
+        console.print(Text(line), soft_wrap=True)
     console.print(profile_table(ended))
-    console.print(f"figures in {RunFolder(Path(run.folder)).figures}", highlight=False, soft_wrap=True)
+    console.print(Text(f"figures in {RunFolder(Path(run.folder)).figures}"), soft_wrap=True)
 
 
 def _default_folder(wanted: Wanted) -> Path:

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import typer
 from rich.console import Console
+from rich.text import Text
 
 from config.errors import ConfigError
 from learning.errors import LearningError
@@ -38,7 +39,8 @@ def success_rows(run: Path, *, rig: Path, n_tests: int) -> list[BenchResult]:
         goals = [goal.name for goal in folder.manifest().goals]
         console.print(f"{len(goals)} goals, {n_tests} test epochs each, 4 to 8 s a test epoch")
         with console.status("connecting") as status:
-            rows = assess(folder, n_tests=n_tests, seed=None, rules_epoch=None, rig=str(rig), tell=status.update)
+            tell = lambda sentence: status.update(Text(sentence))  # noqa: E731
+            rows = assess(folder, n_tests=n_tests, seed=None, rules_epoch=None, rig=str(rig), tell=tell)
     except (LearningError, ConfigError) as error:
         raise typer.BadParameter(str(error), param_hint="RUN") from error
     return success_results(rows, goals)
