@@ -66,8 +66,9 @@ def learn(
 ) -> None:
     """Let the arm teach itself a scenario's goals; leave a run folder with metrics, checkpoints and figures.
 
-    Ctrl-C stops at the end of the epoch in hand (exit code 130) and loses nothing. --resume goes on: in lock-step bit
-    for bit, by the wall clock (rigs with an address) from the same learnt state.
+    Ctrl-C stops at the end of the epoch in hand and of the evaluations due by then (exit code 130) and loses nothing;
+    a second one stops at once. --resume goes on: in lock-step bit for bit, by the wall clock (rigs with an address)
+    from the same learnt state.
     """
     from learning.session import open_session  # brings torch, seconds that reports do not need
 
