@@ -7,10 +7,13 @@ A file is an uncompressed zip of `state.json` (the tree, with arrays replaced by
 import hashlib
 import io
 import json
+import lzma
 import math
 import os
 import re
+import struct
 import zipfile
+import zlib
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +26,20 @@ __all__ = ["CheckpointStore", "decode", "encode", "write_atomically"]
 State = dict[str, Any]
 _EPOCH_OF_ZIP = (1980, 1, 1, 0, 0, 0)
 _NAME = re.compile(r"^checkpoint-(\d{8})\.zip$")
+_UNREADABLE = (
+    zipfile.BadZipFile,
+    zlib.error,
+    lzma.LZMAError,
+    struct.error,
+    EOFError,
+    LookupError,
+    MemoryError,
+    OSError,
+    RuntimeError,
+    TypeError,
+    ValueError,
+)
+"""What zipfile, json and numpy raise on changed bytes: a flag that says encrypted, a size beyond memory, no entry."""
 
 
 # ------------------------------------------------------------------------------------------------------ the format
@@ -51,20 +68,19 @@ def encode(state: State) -> bytes:
 def decode(raw: bytes) -> State:
     """Return the state held by checkpoint bytes. Raises CheckpointError if they are torn or changed."""
     try:
-        with zipfile.ZipFile(io.BytesIO(raw)) as archive:
-            entries = {name: archive.read(name) for name in archive.namelist()}
-    except (zipfile.BadZipFile, EOFError, NotImplementedError, ValueError, OSError) as error:
-        message = f"not a whole checkpoint: {error}"
+        return _decode(raw)
+    except _UNREADABLE as error:
+        message = f"not a whole checkpoint: {str(error) or type(error).__name__}"
         raise CheckpointError(message) from error
-    try:
-        digests = json.loads(entries.pop("sha256.json"))
-        tree = json.loads(entries["state.json"])
-    except (KeyError, ValueError) as error:
-        message = f"not a checkpoint: {error!r}"
-        raise CheckpointError(message) from error
+
+
+def _decode(raw: bytes) -> State:
+    with zipfile.ZipFile(io.BytesIO(raw)) as archive:
+        entries = {name: archive.read(name) for name in archive.namelist()}
+    digests = json.loads(entries.pop("sha256.json"))
     if digests != {name: hashlib.sha256(entry).hexdigest() for name, entry in entries.items()}:
         raise CheckpointError("the checkpoint's digests do not match what it holds")
-    state = _unflatten(tree, entries)
+    state = _unflatten(json.loads(entries["state.json"]), entries)
     if not isinstance(state, dict):
         raise CheckpointError("a checkpoint holds one mapping at its root")
     return state

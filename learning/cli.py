@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, ParamSpec, TypeVar
 import msgspec
 import typer
 from rich.console import Console
+from rich.text import Text
 
 from learning.consent import Consent
 from learning.ended import Ended
@@ -65,8 +66,9 @@ def learn(
 ) -> None:
     """Let the arm teach itself a scenario's goals; leave a run folder with metrics, checkpoints and figures.
 
-    Ctrl-C stops at the end of the epoch in hand (exit code 130) and loses nothing. --resume goes on: in lock-step bit
-    for bit, by the wall clock (rigs with an address) from the same learnt state.
+    Ctrl-C stops at the end of the epoch in hand and of the evaluations due by then (exit code 130) and loses nothing;
+    a second one stops at once. --resume goes on: in lock-step bit for bit, by the wall clock (rigs with an address)
+    from the same learnt state.
     """
     from learning.session import open_session  # brings torch, seconds that reports do not need
 
@@ -192,9 +194,9 @@ def _write_figures(runs: list[Run], folder: Path) -> list[Path]:
 def _tell(run: Run, ended: Ended) -> None:
     console = Console()
     for line in summary_lines(run):
-        console.print(line, highlight=False, soft_wrap=True)
+        console.print(Text(line), soft_wrap=True)
     console.print(profile_table(ended))
-    console.print(f"figures in {RunFolder(Path(run.folder)).figures}", highlight=False, soft_wrap=True)
+    console.print(Text(f"figures in {RunFolder(Path(run.folder)).figures}"), soft_wrap=True)
 
 
 def _default_folder(wanted: Wanted) -> Path:

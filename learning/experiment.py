@@ -107,7 +107,7 @@ class Experiment:
     def run(self, should_stop: Callable[[], bool] = lambda: False) -> int:
         """Learn until the plan is carried out or a stop is asked for, and return how many epochs are done.
 
-        A stop takes effect at the end of the epoch in hand; evaluations asked for are finished and the state is kept.
+        A stop takes effect at the end of the epoch in hand; evaluations due by then are finished and the state is kept.
 
         Raises:
             TooManyVoidEpochsError: epoch after epoch was cut short.

@@ -109,8 +109,8 @@ class Progress:
             self.say(f"evaluated at epoch {rows[0].epoch}: {shares}")
 
     def say(self, line: str) -> None:
-        """Print a line above the bar."""
-        self._console.print(line, highlight=False, soft_wrap=True)
+        """Print a line above the bar, letter by letter: a path or a name in it is no markup."""
+        self._console.print(Text(line), soft_wrap=True)
 
     # ------------------------------------------------------------------------------------------------------- showing
 
@@ -149,7 +149,7 @@ class Progress:
         for goal, recent, tested in zip(self._goals, self._recent, self._tested, strict=True):
             marks = "".join("█" if hit else "·" for hit in recent)
             share = "" if not recent else f"{_share(recent):4.0%}"
-            table.add_row(goal, share, Text(marks, "green"), "" if tested is None else f"tested {tested:.0%}")
+            table.add_row(Text(goal), share, Text(marks, "green"), "" if tested is None else f"tested {tested:.0%}")
         picture = Table.grid()  # a bar on its own would not end its line
         for part in (head, bar, table):
             picture.add_row(part)
@@ -162,7 +162,7 @@ class Status:
     def __init__(self, sentence: str, *, now_s: Callable[[], float], console: Console | None = None) -> None:
         self._console = console or Console(stderr=True)
         self._now_s, self._shown_s = now_s, now_s()
-        self._spinner = self._console.status(sentence) if self._console.is_terminal else None
+        self._spinner = self._console.status(Text(sentence)) if self._console.is_terminal else None
 
     def __enter__(self) -> Self:
         if self._spinner is not None:
@@ -176,10 +176,10 @@ class Status:
     def __call__(self, sentence: str) -> None:
         """Tell how far it is."""
         if self._spinner is not None:
-            self._spinner.update(sentence)
+            self._spinner.update(Text(sentence))
         elif (now_s := self._now_s()) - self._shown_s >= LINE_EVERY_S:
             self._shown_s = now_s
-            self._console.print(sentence, highlight=False, soft_wrap=True)
+            self._console.print(Text(sentence), soft_wrap=True)
 
 
 def duration_text(seconds: float) -> str:

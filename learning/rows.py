@@ -1,7 +1,5 @@
 """The rows of a run's metrics, as other tools read them: trials, goal choices, evaluations by goal, graph looks."""
 
-import csv
-from collections.abc import Iterable
 from pathlib import Path
 from typing import TypeVar
 
@@ -108,6 +106,8 @@ class GraphRow(Row, frozen=True, kw_only=True):
 
 
 R = TypeVar("R", bound=Row)
+SHOWN = 60
+"""Characters of a wrong line that its error quotes."""
 
 
 def trial_rows(record: EpochRecord) -> list[TrialRow]:
@@ -156,25 +156,48 @@ def read_rows(path: Path, row_type: type[R]) -> list[R]:
     """Return a table's rows. A torn last line (the writer was killed) is left out.
 
     Raises:
-        RunFolderError: the file is missing or not such a table.
+        RunFolderError: the file is missing or not such a table; the message names file and line.
     """
     try:
-        text = path.read_text(encoding="utf-8")
+        raw = path.read_bytes()
     except OSError as error:
         message = f"{path}: expected a table of {', '.join(row_type.__struct_fields__)}, got {error.strerror}"
         raise RunFolderError(message) from error
-    lines = text[: text.rfind("\n") + 1].splitlines()
+    lines = _lines(path, raw[: raw.rfind(b"\n") + 1])
     if not lines or lines[0] != header(row_type):
-        raise RunFolderError(f"{path}: expected the columns {header(row_type)}, got {lines[0] if lines else 'nothing'}")
-    return _parse(path, lines, row_type)
-
-
-def _parse(path: Path, lines: Iterable[str], row_type: type[R]) -> list[R]:
-    entries = [{key: text or None for key, text in entry.items()} for entry in csv.DictReader(lines)]
+        got = repr(lines[0][:SHOWN]) if lines else "nothing"
+        raise RunFolderError(f"{path}: expected the columns {header(row_type)}, got {got}")
+    names = row_type.__struct_fields__
+    entries = [_entry(path, i, line, names) for i, line in enumerate(lines[1:], 2)]
     try:
         return msgspec.convert(entries, list[row_type], strict=False)
+    except msgspec.ValidationError:
+        return [_row(path, i, entry, row_type) for i, entry in enumerate(entries, 2)]
+
+
+def _lines(path: Path, raw: bytes) -> list[str]:
+    """Return the whole lines without their ends."""
+    try:
+        text = raw.decode()
+    except UnicodeDecodeError as error:
+        i = raw.count(b"\n", 0, error.start) + 1
+        message = f"{path}: line {i}: expected UTF-8 text, got {raw[error.start : error.start + 1]!r}"
+        raise RunFolderError(message) from error
+    return [line.rstrip("\r") for line in text.split("\n")[:-1]]
+
+
+def _entry(path: Path, i: int, line: str, names: tuple[str, ...]) -> dict[str, str | None]:
+    entries = line.split(",")
+    if len(entries) != len(names) or "\0" in line:
+        raise RunFolderError(f"{path}: line {i}: expected {len(names)} cells of text, got {line[:SHOWN]!r}")
+    return {name: entry or None for name, entry in zip(names, entries, strict=True)}
+
+
+def _row(path: Path, i: int, entry: dict[str, str | None], row_type: type[R]) -> R:
+    try:
+        return msgspec.convert(entry, row_type, strict=False)
     except msgspec.ValidationError as error:
-        message = f"{path}: {error}"
+        message = f"{path}: line {i}: {error}"
         raise RunFolderError(message) from error
 
 

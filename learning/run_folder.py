@@ -95,7 +95,7 @@ class RunFolder:
         except OSError as error:
             message = f"{self.path}: expected a run folder, found no run.json in it ({error.strerror})"
             raise RunFolderError(message) from error
-        except msgspec.DecodeError as error:
+        except (msgspec.DecodeError, UnicodeDecodeError) as error:
             message = f"{path}: {error}"
             raise RunFolderError(message) from error
         if manifest.format != FORMAT:

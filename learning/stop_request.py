@@ -1,4 +1,4 @@
-"""Ctrl-C and SIGTERM: the first asks for a stop at the next epoch boundary, the second stops at once."""
+"""Ctrl-C and SIGTERM: the first asks for a stop at the epoch's end, with its evaluations; the second stops at once."""
 
 import signal
 from collections.abc import Callable
@@ -34,4 +34,7 @@ class StopRequest:
         if self.is_made:
             raise KeyboardInterrupt
         self.is_made = True
-        self._report("stopping after this epoch (once more: at once, losing what came after the last checkpoint)")
+        self._report(
+            "stopping after this epoch and the evaluations that are due or under way "
+            "(once more: at once, losing what came after the last checkpoint)"
+        )

@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Sequence
 
 from rich.table import Table
+from rich.text import Text
 
 from learning.ended import Ended
 from learning.explain import Explanation
@@ -48,7 +49,7 @@ def report_table(report: Report) -> Table:
     for group in report.groups:
         for era in group.eras:
             table.add_row(
-                group.name,
+                Text(group.name),
                 str(era.from_epoch),
                 _count(era.learnt),
                 _spread(era.learnt_after, "{:.0f}"),
@@ -65,7 +66,7 @@ def score_table(rows: Sequence[EvaluationRow], goals: Sequence[str]) -> Table:
     for row in rows:
         trials = f"{row.trials_achieved / row.n_successes:.2f}" if row.n_successes else "–"
         graph = "–" if row.graph_cases is None else f"{row.graph_wrong} of {row.graph_cases} states"
-        table.add_row(goals[row.goal], f"{row.n_successes} of {row.n_all}", trials, graph)
+        table.add_row(Text(goals[row.goal]), f"{row.n_successes} of {row.n_all}", trials, graph)
     return table
 
 
@@ -87,9 +88,13 @@ def explanation_table(explanations: Sequence[Explanation], goals: Sequence[str])
             if literal.goal not in (*told.needs_on, *told.needs_off)
         ]
         table.add_row(
-            goals[told.goal],
-            "\n".join(
-                [*(needs or ["nothing"]), *(f"[dim]perhaps {doubt}[/dim]" for doubt in doubts), _plan(told, goals)]
+            Text(goals[told.goal]),
+            Text("\n").join(
+                [
+                    *(Text(need) for need in needs or ["nothing"]),
+                    *(Text(f"perhaps {doubt}", "dim") for doubt in doubts),
+                    Text(_plan(told, goals)),
+                ]
             ),
             "\n".join([f"{told.probability:.0%} sure of all", *_evidence(told), f"skill {told.skill:.0%}"]),
         )

@@ -3,7 +3,7 @@
 import msgspec
 
 from config.learning import LearningConfig
-from config.loader import load_learning, load_rig, load_scenario, resolve
+from config.loader import load_learning, load_rig, load_wired, resolve, with_rig
 from config.resolved import Resolved
 from learning.errors import RunFolderError
 
@@ -41,12 +41,13 @@ def refuse_another(wanted: Wanted, folder: str, resolved: Resolved, seed: int) -
 
     Raises:
         RunFolderError: it differs.
+        ConfigError: a file is missing or wrong, or the rig's arm is no longer what it was.
     """
     stored = resolved.learning
     same = {
         "--seed": wanted.seed is None or wanted.seed == seed,
-        "--scenario": wanted.scenario is None or load_scenario(wanted.scenario) == resolved.scenario,
-        "--rig": wanted.rig is None or load_rig(wanted.rig) == resolved.rig,
+        "--scenario": wanted.scenario is None or load_wired(wanted.scenario) == (resolved.scenario, resolved.rule_sets),
+        "--rig": wanted.rig is None or _is_same_rig(wanted.rig, resolved),
         "--preset": wanted.preset is None or _with_experiment(load_learning(wanted.preset), stored) == stored,
         "--epochs": wanted.epochs is None or wanted.epochs == stored.experiment.epochs,
         "--judged": not wanted.judged or _with_protocol(stored, wanted) == stored,
@@ -57,6 +58,11 @@ def refuse_another(wanted: Wanted, folder: str, resolved: Resolved, seed: int) -
             f"{folder} holds a run with another {' and '.join(differing)}: leave that out to go on with it, "
             "or name another folder by --out"
         )
+
+
+def _is_same_rig(rig: str, resolved: Resolved) -> bool:
+    """Whether a rig is the one of before, its cell's file too. Another arm's file is a ConfigError."""
+    return load_rig(rig) == resolved.rig and with_rig(resolved, rig) == resolved
 
 
 def _with_protocol(learning: LearningConfig, wanted: Wanted) -> LearningConfig:

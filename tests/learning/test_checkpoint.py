@@ -1,6 +1,8 @@
 """Checkpoints keep state bit for bit and survive torn files."""
 
+import hashlib
 import io
+import json
 import os
 import zipfile
 
@@ -105,6 +107,47 @@ def test_what_was_changed_and_packed_again_is_noticed():
             archive.writestr(name, entry.replace(b'"epoch":3', b'"epoch":4') if name == "state.json" else entry)
     with pytest.raises(CheckpointError, match="digests"):
         decode(changed.getvalue())
+
+
+def test_every_flipped_bit_gives_the_same_state_or_is_told_as_a_torn_checkpoint():
+    state = {"weights": np.arange(6.0), "epoch": 3}
+    raw = encode(state)
+    for bit in range(8 * len(raw)):
+        flipped = bytearray(raw)
+        flipped[bit // 8] ^= 1 << bit % 8
+        try:
+            decoded = decode(bytes(flipped))
+        except CheckpointError:
+            continue
+        assert bits(decoded) == bits(state), f"bit {bit}"
+
+
+def packed(tree):
+    """A whole zip with right digests around any tree."""
+    raw = json.dumps(tree).encode()
+    buffer = io.BytesIO()
+    with zipfile.ZipFile(buffer, "w") as archive:
+        archive.writestr("state.json", raw)
+        archive.writestr("sha256.json", json.dumps({"state.json": hashlib.sha256(raw).hexdigest()}))
+    return buffer.getvalue()
+
+
+@pytest.mark.parametrize("tree", [{"a": {"$array": 0}}, {"a": {"$float": []}}, {"a": {"$float": "much"}}, [1]])
+def test_a_whole_zip_that_holds_no_state_is_refused(tree):
+    with pytest.raises(CheckpointError):
+        decode(packed(tree))
+
+
+def test_a_newest_checkpoint_marked_as_encrypted_falls_back_to_the_one_before(tmp_path):
+    store = CheckpointStore(tmp_path)
+    store.save(50, encode({"epoch": 50}))
+    newest = store.save(100, encode({"epoch": 100}))
+    raw = bytearray(newest.read_bytes())
+    raw[raw.index(b"PK\x01\x02") + 8] ^= 1
+    newest.write_bytes(raw)
+    state, passed_over = store.newest()
+    assert state == {"epoch": 50}
+    assert "encrypted" in passed_over[0]
 
 
 def test_only_the_last_two_checkpoints_are_kept_and_no_temporary_file_stays(tmp_path):

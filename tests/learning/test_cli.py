@@ -92,6 +92,14 @@ def test_resume_begins_a_run_where_there_is_none(folder):
     assert RunFolder(folder / "fresh").manifest().n_epochs == 1
 
 
+def test_a_run_folder_may_have_any_name(folder):
+    out = folder / "[v2]" / "m[" / "x]"
+    done = learn(out, "--epochs", 1)
+    assert done.exit_code == 0, done.output
+    assert done.stdout.splitlines()[0].startswith(f"{out}: 1 epochs")
+    assert done.stdout.splitlines()[-1] == f"figures in {out}/figures"
+
+
 def test_resuming_with_a_changed_config_is_refused_and_changes_nothing(run, tmp_path):
     out = tmp_path / "run"
     shutil.copytree(run[0], out)

@@ -92,6 +92,13 @@ def test_stopped_at_any_epoch_and_resumed_is_identical(whole, tmp_path, stop_at)
     assert files_of(tmp_path) == files_of(whole)
 
 
+def test_a_stop_at_an_epoch_with_an_evaluation_finishes_that_evaluation(whole, tmp_path):
+    assert ToyRun(tmp_path, PROTOCOL, seed=5).go(stop_at=20) == 20
+    rows = read_rows(tmp_path / "evaluations.csv", EvaluationRow)
+    assert [row.epoch for row in rows] == [10] * N_GOALS + [20] * N_GOALS
+    assert rows == read_rows(whole / "evaluations.csv", EvaluationRow)[: 2 * N_GOALS]
+
+
 def test_a_run_that_is_done_does_nothing_more_when_resumed(whole, tmp_path):
     ToyRun(tmp_path, PROTOCOL, seed=5).go()
     assert ToyRun(tmp_path, PROTOCOL, seed=5, resume=True).go() == 120

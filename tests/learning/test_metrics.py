@@ -207,6 +207,29 @@ def test_what_is_no_such_table_is_refused(tmp_path, text):
         read_rows(tmp_path / "absent.csv", GoalRow)
 
 
+@pytest.mark.parametrize(
+    ("damage", "told"),
+    [
+        (b"\xff", "line 3: expected UTF-8 text, got b'\\xff'"),
+        (b"\0", "line 3: expected 6 cells of text, got '1,0"),
+        (b"9" * 200_000, "line 3: "),
+        (b"\x85,7".decode("latin-1").encode(), "line 3: expected 6 cells of text"),
+        (b"x", "line 3: Expected `int`, got `str`"),
+    ],
+)
+def test_a_damaged_line_is_told_by_file_and_number(tmp_path, damage, told):
+    path = tmp_path / "goals.csv"
+    lines = [line.encode() for line in (header(GoalRow), cells(choice(0)), cells(choice(1)), cells(choice(2)))]
+    lines[2] += damage
+    path.write_bytes(b"".join(line + b"\n" for line in lines))
+    with pytest.raises(RunFolderError) as raised:
+        read_rows(path, GoalRow)
+    said = str(raised.value)
+    assert said.startswith(f"{path}: {told}")
+    assert len(said) < len(str(path)) + 200
+    assert len(said.splitlines()) == 1
+
+
 def test_tables_are_cut_back_to_the_rows_a_checkpoint_knew_and_go_on_from_there(tmp_path):
     with Tables(tmp_path) as tables:
         tables.append("trials", [trial_row(0)])

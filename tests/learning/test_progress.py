@@ -118,6 +118,21 @@ def test_the_first_signal_asks_for_a_stop_and_the_second_stops_at_once(number):
     assert signal.getsignal(number) is before
 
 
+@pytest.mark.parametrize("terminal", [True, False])
+@pytest.mark.parametrize("line", ["torn: runs/[v2]/a", "go on with: learn --out /tmp/m[/x]", "runs/:heart:/[bold]"])
+def test_a_path_is_told_letter_by_letter(line, terminal):
+    clock = Clock()
+    text, progress = shown(terminal=terminal, clock=clock)
+    with progress:
+        progress.say(line)
+    assert line in text.getvalue()
+    told = io.StringIO()
+    with Status(line, now_s=clock, console=Console(file=told, force_terminal=terminal, width=100)) as status:
+        clock.now_s += 60.0
+        status(line)
+    assert line in told.getvalue()
+
+
 @pytest.mark.parametrize(("terminal", "n_lines"), [(False, 2), (True, 0)])
 def test_a_status_without_a_terminal_is_a_line_every_ten_seconds(terminal, n_lines):
     clock, text = Clock(), io.StringIO()

@@ -1,9 +1,11 @@
 """Runs side by side: figures of merit by hand, and pictures that hold what they should."""
 
+import io
 import math
 
 import msgspec
 import pytest
+from rich.console import Console
 
 from learning.bench import learning_results
 from learning.errors import RunFolderError
@@ -39,6 +41,12 @@ def test_runs_are_grouped_by_learner_in_the_order_they_came(runs):
     ]
     mixed = group_runs([runs[0], with_manifest(runs[2], scenario="lights")])
     assert [group.name for group in mixed] == ["toy, lamps", "other, lights"]
+
+
+def test_a_learners_name_is_shown_letter_by_letter(runs):
+    console = Console(file=io.StringIO(), width=200)
+    console.print(report_table(report_of(group_runs([with_manifest(runs[0], learner="[/v2] :heart:")]))))
+    assert "[/v2] :heart:" in console.file.getvalue()
 
 
 def test_runs_of_one_learner_with_other_changes_are_refused(runs):

@@ -1,5 +1,7 @@
 """One run a folder, one process at a time, and errors that say what to do."""
 
+from pathlib import Path
+
 import msgspec
 import pytest
 
@@ -8,9 +10,11 @@ from config.resolved import dump_resolved
 from learning.errors import RunFolderError
 from learning.run_folder import RunFolder, run_folders
 from learning.wanted import Wanted, refuse_another, resolve_wanted
+from tests.support.small_lab import RULES, SCENARIO
 from tests.support.toy_folder import toy_manifest
 
 CONFIG = dump_resolved(resolve())
+CONFIG_FILES = Path(__file__).parents[2] / "config"
 
 
 def started(path):
@@ -76,6 +80,9 @@ def test_what_is_no_run_folder_is_told(tmp_path):
     (tmp_path / "run.json").write_text('{"format": 1}')
     with pytest.raises(RunFolderError, match="missing required field"):
         RunFolder(tmp_path).manifest()
+    (tmp_path / "run.json").write_bytes(msgspec.json.encode(toy_manifest()).replace(b"lamps", b"l\xffmps"))
+    with pytest.raises(RunFolderError, match=r"run\.json"):
+        RunFolder(tmp_path).manifest()
     manifest = msgspec.structs.replace(toy_manifest(), format=99)
     (tmp_path / "run.json").write_bytes(msgspec.json.encode(manifest))
     with pytest.raises(RunFolderError, match="expected format 1, got 99"):
@@ -118,3 +125,27 @@ def test_going_on_with_another_run_than_asked_for_is_refused(wanted, named):
         return
     with pytest.raises(RunFolderError, match=f"another {named}: leave that out"):
         refuse_another(wanted, "folder", resolved, seed=3)
+
+
+def test_going_on_after_a_scenarios_rule_file_was_changed_is_refused(tmp_path):
+    (tmp_path / "small.yaml").write_text(SCENARIO)
+    rules = tmp_path / "small_rules.yaml"
+    rules.write_text(RULES)
+    wanted = Wanted(scenario=str(tmp_path / "small.yaml"))
+    resolved = resolve_wanted(wanted)
+    refuse_another(wanted, "folder", resolved, seed=0)
+    rules.write_text(RULES.replace("left_button", "right_button"))
+    with pytest.raises(RunFolderError, match="another --scenario: leave that out"):
+        refuse_another(wanted, "folder", resolved, seed=0)
+
+
+def test_going_on_after_a_rigs_cell_file_was_changed_is_refused(tmp_path):
+    rig, cell = (CONFIG_FILES / name for name in ("rigs/virtual_lab.yaml", "cells/ur_box.yaml"))
+    (tmp_path / "rig.yaml").write_text(rig.read_text().replace("cell: ur_box", "cell: ./cell.yaml"))
+    (tmp_path / "cell.yaml").write_text(cell.read_text())
+    wanted = Wanted(rig=str(tmp_path / "rig.yaml"))
+    resolved = resolve_wanted(wanted)
+    refuse_another(wanted, "folder", resolved, seed=0)
+    (tmp_path / "cell.yaml").write_text(cell.read_text().replace("pin: DI0", "pin: DI0, inverted: true"))
+    with pytest.raises(RunFolderError, match="another --rig: leave that out"):
+        refuse_another(wanted, "folder", resolved, seed=0)

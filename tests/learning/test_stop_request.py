@@ -18,6 +18,7 @@ def test_the_first_signal_asks_for_a_stop_and_says_so(number):
         os.kill(os.getpid(), number)
         assert stop()
     assert len(said) == 1
+    assert said[0].startswith("stopping after this epoch and the evaluations that are due or under way")
 
 
 @pytest.mark.parametrize("first", SIGNALS)

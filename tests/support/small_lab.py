@@ -10,7 +10,7 @@ import yaml
 from sim_twin.controller.process import ControllerProcess
 from sim_twin.controller.server import Setup
 
-__all__ = ["SERIAL", "autotelic", "children_of", "controller_of", "make_lab", "start"]
+__all__ = ["RULES", "SCENARIO", "SERIAL", "autotelic", "children_of", "controller_of", "make_lab", "start"]
 
 ROOT = Path(__file__).parents[2]
 SERIAL = "20215501234"
