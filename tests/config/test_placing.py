@@ -57,6 +57,22 @@ def test_things_may_touch_but_not_overlap_in_any_draw(inside, beyond, where):
     assert caught.value.where == where
 
 
+@pytest.mark.parametrize("key", ["inside", "receptacle"])
+def test_a_lid_shuts_over_what_stands_in_its_box_and_an_open_box_holds_taller_things(key):
+    def holding(height_m, lid_angle):
+        scenario = table(lid_angle=lid_angle)
+        jar = msgspec.structs.replace(scenario.cylinders[0], inside=None, position_m=(0.5, -0.2), height_m=height_m)
+        place = {"inside": "box", "position_m": (0.0, 0.0)} if key == "inside" else {"receptacle": "box"}
+        return msgspec.structs.replace(scenario, cylinders=(msgspec.structs.replace(jar, **place),))
+
+    most_m = table().boxes[0].height_m - 0.002
+    check_placing(holding(most_m, 1.85), "file")
+    check_placing(holding(2 * most_m, None), "file")
+    with pytest.raises(ConfigError) as caught:
+        check_placing(holding(most_m + HAIR_M, 1.85), "file")
+    assert caught.value.where == "cylinders[0].height_m"
+
+
 def test_the_hand_must_find_room_between_the_walls():
     room_m = 0.1 - ARM.tool.stroke_m / 2 - ARM.tool.pad_size_m[0]
     check_fit(table(box_y=0.25, jar_spread=room_m), ARM, "file")

@@ -36,6 +36,32 @@ def test_a_workspace_beyond_the_arms_is_refused(axis):
         assert caught.value.where == f"workspace_m[{corner}][{axis}]"
 
 
+@pytest.mark.parametrize(("corner", "sign"), [(0, 1.0), (1, -1.0)])
+def test_a_workspace_holds_the_tools_lowest_and_its_travel_height_over_the_table(corner, sign):
+    corners = [list(LOW), list(HIGH)]
+    corners[corner][2] = ARM.motion.heights_m[corner]
+    fenced(ARM, scenario(tuple(corners[0]), tuple(corners[1])), "file")
+    corners[corner][2] += sign * 1e-6
+    with pytest.raises(ConfigError, match="height over this table") as caught:
+        fenced(ARM, scenario(tuple(corners[0]), tuple(corners[1])), "file")
+    assert caught.value.where == f"workspace_m[{corner}][2]"
+
+
+@pytest.mark.parametrize("sign", [-1.0, 1.0])
+@pytest.mark.parametrize("is_fenced", [False, True])
+def test_a_table_out_of_the_arms_own_reach_is_told_as_that_whatever_fence_there_is(sign, is_fenced):
+    at = (LOW[2] - ARM.motion.heights_m[0], HIGH[2] - ARM.motion.heights_m[1])[sign > 0]
+    there = scenario(LOW, HIGH) if is_fenced else msgspec.structs.replace(load_scenario("paper"), workspace_m=None)
+
+    def moved(height_m):
+        return msgspec.structs.replace(there, table=msgspec.structs.replace(there.table, height_m=height_m))
+
+    fenced(ARM, moved(at), "file")
+    with pytest.raises(ConfigError) as caught:
+        fenced(ARM, moved(at + sign * 1e-6), "file")
+    assert caught.value.where == "table.height_m"
+
+
 def test_a_resolved_files_arm_is_held_to_its_tables_workspace_too(tmp_path):
     resolved = resolve(scenario="paper")
     (tmp_path / "wide.yaml").write_text(dump_resolved(msgspec.structs.replace(resolved, arm=ARM)))
