@@ -9,6 +9,7 @@ times as long as in a loop of its own.
 import math
 
 from config.arm import ArmConfig
+from robot.geometry import unwound
 from robot.messages import Vec3, Vec6
 
 __all__ = ["DownwardArm"]
@@ -72,10 +73,6 @@ class DownwardArm:
         q6 = math.atan2(-side * math.cos(yaw_rad - q1), side * math.sin(q1 - yaw_rad))
         s1, s2, s3, s4, s5, s6 = seed_rad
         return (
-            _near(q1, s1), _near(q2, s2), _near(q3, s3), _near(q5 - q2 - q3, s4), _near(q5, s5), _near(q6, s6),
+            unwound(q1, s1), unwound(q2, s2), unwound(q3, s3),
+            unwound(q5 - q2 - q3, s4), unwound(q5, s5), unwound(q6, s6),
         )  # fmt: skip
-
-
-def _near(angle: float, reference: float) -> float:
-    """Return the angle plus the whole turns that bring it nearest a reference."""
-    return angle - math.tau * round((angle - reference) / math.tau)

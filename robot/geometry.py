@@ -4,7 +4,7 @@ import math
 
 from robot.messages import Quat, Vec3
 
-__all__ = ["inside_box", "quat_of_rotation_vector", "tool_offset", "turn_about_vertical"]
+__all__ = ["inside_box", "quat_of_rotation_vector", "tool_offset", "turn_about_vertical", "unwound"]
 
 
 def tool_offset(point_m: Vec3, tcp_m: Vec3, yaw_rad: float) -> Vec3:
@@ -39,3 +39,8 @@ def quat_of_rotation_vector(rx: float, ry: float, rz: float) -> Quat:
         return 1.0, rx / 2.0, ry / 2.0, rz / 2.0
     share = math.sin(angle / 2.0) / angle
     return math.cos(angle / 2.0), rx * share, ry * share, rz * share
+
+
+def unwound(angle: float, reference: float) -> float:
+    """Return the angle plus the whole turns that bring it nearest a reference."""
+    return angle - math.tau * round((angle - reference) / math.tau)

@@ -3,7 +3,7 @@
 import math
 
 from config.arm import ArmConfig
-from robot.geometry import turn_about_vertical
+from robot.geometry import turn_about_vertical, unwound
 from robot.kinematics import Kinematics, UnreachableError
 from robot.messages import Vec3, Vec6
 from robot.motion.limiter import AxisLimits, Limiter
@@ -157,7 +157,7 @@ class Follower:
         slowed = _between(self.q_rad, q, share)
         target, speed = self._tool.target, [v * share for v in self._tool.speed]
         yaw = turn_about_vertical(self._kinematics.chain.quat(slowed))
-        self._tool.seed([*self._kinematics.tcp(slowed), _near(yaw, target[3])], speed)
+        self._tool.seed([*self._kinematics.tcp(slowed), unwound(yaw, target[3])], speed)
         self._tool.aim(target)
         return slowed
 
@@ -169,7 +169,7 @@ class Follower:
         tilt = 2.0 * math.hypot(quat[0], quat[3])  # a tool that points straight down is turned by (0, x, y, 0)
         if tilt > ALIGN_RAD:
             return
-        yaw = _near(turn_about_vertical(quat), self._home_yaw_rad)
+        yaw = unwound(turn_about_vertical(quat), self._home_yaw_rad)
         if abs(yaw - self._home_yaw_rad) < ALIGN_RAD:
             yaw = self._home_yaw_rad
         self._is_upright = True
@@ -195,11 +195,6 @@ class Follower:
         self.aim_joints(_between(now, q, min(1.0, ALIGN_STEP_RAD / largest)) if largest > 0.0 else q)
         self.yaw_rad = yaw_rad
         return True
-
-
-def _near(angle: float, reference: float) -> float:
-    """Return the angle plus the whole turns that bring it nearest a reference."""
-    return angle - math.tau * round((angle - reference) / math.tau)
 
 
 def _between(a: Vec6, b: Vec6, share: float) -> Vec6:

@@ -5,7 +5,6 @@ import ruckig
 
 __all__ = ["AxisLimits", "Limiter"]
 
-
 EDGE = 1e-12
 """Share of its greatest speed within which an axis counts as about to reach it exactly."""
 
