@@ -39,7 +39,10 @@ def success_rows(run: Path, *, rig: Path, n_tests: int) -> list[BenchResult]:
         goals = [goal.name for goal in folder.manifest().goals]
         console.print(f"{len(goals)} goals, {n_tests} test epochs each, 4 to 8 s a test epoch")
         with console.status("connecting") as status:
-            tell = lambda sentence: status.update(Text(sentence))  # noqa: E731
+
+            def tell(sentence: str) -> None:
+                status.update(Text(sentence))
+
             rows = assess(folder, n_tests=n_tests, seed=None, rules_epoch=None, rig=str(rig), tell=tell)
     except (LearningError, ConfigError) as error:
         raise typer.BadParameter(str(error), param_hint="RUN") from error
