@@ -20,7 +20,7 @@ from learning.report import Run, group_runs, load_run, report_of
 from learning.run_folder import RunFolder, run_folders
 from learning.stop_request import StopRequest
 from learning.stopwatch import Stopwatch
-from learning.telling import explanation_table, profile_of, profile_table, report_table, score_table, summary_lines
+from learning.telling import explanation_table, profile_table, report_table, score_table, summary_lines
 from learning.wanted import Wanted
 
 if TYPE_CHECKING:
@@ -85,7 +85,6 @@ def learn(
             session.close()
         run = load_run(folder)
         folder.write_json("summary.json", run.summary)
-        folder.write_json("profile.json", profile_of(ended))
         _write_figures([run], folder.figures)
     if json:
         typer.echo(msgspec.json.encode(run.summary).decode())
@@ -195,7 +194,7 @@ def _tell(run: Run, ended: Ended) -> None:
     console = Console()
     for line in summary_lines(run):
         console.print(Text(line), soft_wrap=True)
-    console.print(profile_table(ended))
+    console.print(profile_table(ended.spent))
     console.print(Text(f"figures in {RunFolder(Path(run.folder)).figures}"), soft_wrap=True)
 
 

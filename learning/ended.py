@@ -2,6 +2,8 @@
 
 import msgspec
 
+from learning.time_spent import TimeSpent
+
 __all__ = ["Ended"]
 
 
@@ -12,10 +14,8 @@ class Ended(msgspec.Struct, frozen=True, kw_only=True):
     """Epochs done, those of earlier sessions counted."""
     n_epochs: int
     """Epochs asked for."""
-    seconds: float
-    n_decisions: int
-    """Decisions while learning, in this session."""
-    seconds_by_layer: dict[str, float]
+    spent: TimeSpent
+    """By this session and those before it."""
 
     @property
     def is_finished(self) -> bool:

@@ -81,6 +81,7 @@ class Experiment:
         watcher: Watcher,
         oracle: Oracle | None = None,
         stopwatch: Stopwatch | None = None,
+        when_kept: Callable[[], None] = lambda: None,
     ) -> None:
         self._plan = plan
         self._agent = agent
@@ -91,17 +92,18 @@ class Experiment:
         self._watcher = watcher
         self._oracle = oracle
         self._stopwatch = stopwatch or Stopwatch()
+        self._when_kept = when_kept
         self._cases: dict[int, list[GoalState]] = {}
         self._waiting: deque[_Due] = deque()
         self._n_evaluation_rows = tables.n_rows("evaluations")
         """Rows written or on their way."""
-        self._n_done = 0
+        self._n_done = self._n_done_before = 0
         self._n_void_running = 0
 
     def restore(self, state: dict[str, Any]) -> None:
         """Take up the run where a checkpoint left it; the tables must have been cut back to its row counts."""
         self._agent.load_state_dict(state["agent"])
-        self._n_done = state["n_done"]
+        self._n_done = self._n_done_before = state["n_done"]
         self._n_void_running = state["n_void_running"]
 
     def run(self, should_stop: Callable[[], bool] = lambda: False) -> int:
@@ -235,3 +237,5 @@ class Experiment:
             captured = self._waiting.popleft()
             self._tables.sync()
             self._store.save(captured.epoch, captured.state)
+            if self._n_done > self._n_done_before:
+                self._when_kept()

@@ -13,12 +13,14 @@ from config.resolved import Resolved
 from learning.checkpoint import CheckpointStore, write_atomically
 from learning.errors import RunFolderError
 from learning.rows import EvaluationRow, GoalRow, GraphRow, TrialRow, read_rows
+from learning.time_spent import TimeSpent
 
 __all__ = ["FORMAT", "GoalInfo", "Manifest", "RunFolder", "run_folders"]
 
 FORMAT = 1
 CONFIG_NAME = "config.yaml"
 MANIFEST_NAME = "run.json"
+PROFILE_NAME = "profile.json"
 
 
 class GoalInfo(msgspec.Struct, frozen=True, kw_only=True):
@@ -102,6 +104,13 @@ class RunFolder:
             raise RunFolderError(f"{path}: expected format {FORMAT}, got {manifest.format}")
         return manifest
 
+    def time_spent(self) -> TimeSpent:
+        """Return where the time of the sessions so far went; none where that is not known."""
+        try:
+            return msgspec.json.decode((self.path / PROFILE_NAME).read_bytes(), type=TimeSpent)
+        except (OSError, msgspec.DecodeError, UnicodeDecodeError):
+            return TimeSpent()
+
     def trials(self) -> list[TrialRow]:
         """Return one row a trial."""
         return read_rows(self.path / "trials.csv", TrialRow)
@@ -156,6 +165,10 @@ class RunFolder:
         self.refuse_unless_empty()
         self.write_json(MANIFEST_NAME, manifest)
         write_atomically(self.path / CONFIG_NAME, config.encode())
+
+    def keep_time_spent(self, spent: TimeSpent) -> None:
+        """Write where the time of all sessions went."""
+        self.write_json(PROFILE_NAME, spent.as_tree())
 
     def write_json(self, name: str, value: msgspec.Struct | dict[str, object]) -> None:
         """Write one JSON file, indented."""

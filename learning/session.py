@@ -13,6 +13,7 @@ from learning.provenance import manifest_of
 from learning.run_folder import Manifest, RunFolder
 from learning.stopwatch import Stopwatch
 from learning.tables import Tables
+from learning.time_spent import TimeSpent
 from learning.wanted import Wanted, refuse_another, resolve_wanted
 from robot.oracle import rules_oracle
 
@@ -43,6 +44,9 @@ class Session:
     def run(self, progress: Progress, *, n_workers: int, should_stop: Callable[[], bool]) -> Ended:
         """Learn until all epochs are done or a stop is asked for.
 
+        Where the time went is kept in the folder with every checkpoint, added to what earlier sessions kept; a session
+        that runs no epoch leaves that as it is.
+
         Args:
             progress: is told how it goes.
             n_workers: evaluation processes beside this one.
@@ -50,6 +54,7 @@ class Session:
         """
         manifest, state = self.manifest, self.state
         learner = self._learner
+        before = self._folder.time_spent() if self.n_done else TimeSpent()
         self._stopwatch.lap("start-up")
         pool = EvaluationPool(
             tester=build_agent(self._resolved, learner.station.spec, seed=manifest.seed),
@@ -69,13 +74,19 @@ class Session:
                 watcher=progress,
                 oracle=rules_oracle(self._resolved),
                 stopwatch=self._stopwatch,
+                when_kept=lambda: self._folder.keep_time_spent(before + self._spent(progress)),
             )
             if state is not None:
                 experiment.restore(state)
             n_done = experiment.run(should_stop)
-        return Ended(
-            n_done=n_done,
-            n_epochs=manifest.n_epochs,
+        spent = before
+        if n_done > self.n_done:
+            spent += self._spent(progress)
+            self._folder.keep_time_spent(spent)
+        return Ended(n_done=n_done, n_epochs=manifest.n_epochs, spent=spent)
+
+    def _spent(self, progress: Progress) -> TimeSpent:
+        return TimeSpent(
             seconds=self._stopwatch.now_s() - self._stopwatch.started_s,
             n_decisions=progress.n_steps,
             seconds_by_layer=dict(self._stopwatch.seconds_by_layer),

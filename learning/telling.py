@@ -5,16 +5,14 @@ from collections.abc import Iterator, Sequence
 from rich.table import Table
 from rich.text import Text
 
-from learning.ended import Ended
 from learning.explain import Explanation
 from learning.metrics import EraSummary
 from learning.progress import duration_text
 from learning.report import Count, Report, Run, Spread
 from learning.rows import EvaluationRow
+from learning.time_spent import TimeSpent
 
-__all__ = ["explanation_table", "profile_of", "profile_table", "report_table", "score_table", "summary_lines"]
-
-MICRO = 1e6
+__all__ = ["explanation_table", "profile_table", "report_table", "score_table", "summary_lines"]
 
 
 def summary_lines(run: Run) -> Iterator[str]:
@@ -119,25 +117,12 @@ def _plan(told: Explanation, goals: Sequence[str]) -> str:
     return "\n → ".join(["plan", *(goals[i] for i in told.plan)]) if told.plan else "no plan known"
 
 
-def profile_of(ended: Ended) -> dict[str, object]:
-    """Return where a session's time went, by layer."""
-    n = max(1, ended.n_decisions)
-    return {
-        "seconds": ended.seconds,
-        "n_decisions": ended.n_decisions,
-        "decisions_per_s": ended.n_decisions / ended.seconds if ended.seconds else 0.0,
-        "seconds_by_layer": ended.seconds_by_layer,
-        "us_per_decision_by_layer": {name: MICRO * s / n for name, s in ended.seconds_by_layer.items()},
-    }
-
-
-def profile_table(ended: Ended) -> Table:
-    """Return where a session's time went, greatest share first."""
-    table = Table("layer", "seconds", "share", "µs a decision", title=f"{duration_text(ended.seconds)}, by layer")
-    total = sum(ended.seconds_by_layer.values()) or 1.0
-    for name, seconds in sorted(ended.seconds_by_layer.items(), key=lambda entry: -entry[1]):
-        per_decision = f"{MICRO * seconds / max(1, ended.n_decisions):.0f}"
-        table.add_row(name, f"{seconds:.1f}", f"{seconds / total:.0%}", per_decision)
+def profile_table(spent: TimeSpent) -> Table:
+    """Return where a run's time went, greatest share first."""
+    table = Table("layer", "seconds", "share", "µs a decision", title=f"{duration_text(spent.seconds)}, by layer")
+    total = sum(spent.seconds_by_layer.values()) or 1.0
+    for name, seconds in sorted(spent.seconds_by_layer.items(), key=lambda entry: -entry[1]):
+        table.add_row(name, f"{seconds:.1f}", f"{seconds / total:.0%}", f"{spent.us_per_decision_by_layer[name]:.0f}")
     return table
 
 

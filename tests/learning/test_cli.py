@@ -81,10 +81,10 @@ def test_a_second_start_is_refused_and_resuming_a_finished_run_is_done_at_once(r
     assert lines(again) == [
         "error: done holds a run already: go on with it by --resume, or name another folder by --out"
     ]
-    trials = (run[0] / "trials.csv").read_bytes()
+    before = [(run[0] / name).read_bytes() for name in ("trials.csv", "profile.json")]
     resumed = learn("done", "--resume")
     assert resumed.exit_code == 0, resumed.output
-    assert (run[0] / "trials.csv").read_bytes() == trials
+    assert [(run[0] / name).read_bytes() for name in ("trials.csv", "profile.json")] == before
 
 
 def test_resume_begins_a_run_where_there_is_none(folder):

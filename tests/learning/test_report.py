@@ -44,9 +44,10 @@ def test_runs_are_grouped_by_learner_in_the_order_they_came(runs):
 
 
 def test_a_learners_name_is_shown_letter_by_letter(runs):
-    console = Console(file=io.StringIO(), width=200)
-    console.print(report_table(report_of(group_runs([with_manifest(runs[0], learner="[/v2] :heart:")]))))
-    assert "[/v2] :heart:" in console.file.getvalue()
+    text = io.StringIO()
+    table = report_table(report_of(group_runs([with_manifest(runs[0], learner="[/v2] :heart:")])))
+    Console(file=text, width=200).print(table)
+    assert "[/v2] :heart:" in text.getvalue()
 
 
 def test_runs_of_one_learner_with_other_changes_are_refused(runs):
