@@ -44,6 +44,8 @@ class GoalSelection(Section, frozen=True, kw_only=True):
     """Who predicts CP: the expert's utility at the trial's start, or the running success of the goal."""
     credit: OneOf["subgoal", "main_goal"] = "subgoal"
     """Which goal an attempt is credited to."""
+    explored_worth: Share = 1.0
+    """Result of an attempt at a sub-goal that curiosity brought about and not its model, for credit `subgoal`."""
     probability_floor: Share = 0.0
     """Least total probability spread over all goals whatever their values, so that none is lost sight of."""
     floor_by_failure: Share = 0.0

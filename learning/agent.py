@@ -234,6 +234,7 @@ class Agent:
             predicted=predicted,
             skill=skill,
             n_steps=n_steps,
+            is_explored=self.experts.is_exploring,
         )
         return TrialRecord(trial=trial, attempt=attempt, temperature=temperature)
 

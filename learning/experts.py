@@ -61,7 +61,8 @@ class ExpertSet:
         self._begin(0, explore=False, is_by_model=True)
 
     def _begin(self, subgoal: int, *, explore: bool, is_by_model: bool) -> None:
-        self._subgoal, self._is_exploring, self._is_by_model = subgoal, explore, is_by_model
+        self._subgoal, self._is_learning, self._is_by_model = subgoal, explore, is_by_model
+        self._is_by_curiosity = False
         self._intent = Heading(heading_rad=0.0, distance_m=0.0, height_m=0.0)
         self._trace: list[Array] = []
         """Normalised P's that the moves of this trial were to lead to."""
@@ -75,6 +76,11 @@ class ExpertSet:
         self._was_stuck = False
         self._n_still = 0
         self._rested_at = REST_STEPS
+
+    @property
+    def is_exploring(self) -> bool:
+        """Whether curiosity, and not the sub-goal's model, chose the newest intent."""
+        return self._is_by_curiosity
 
     def begin_trial(self, subgoal: int, percept: Percept, *, explore: bool) -> None:
         """Start a trial; without explore nothing is drawn and nothing learnt changes."""
@@ -91,15 +97,16 @@ class ExpertSet:
         """Return the next intent."""
         states = np.array(percept.button_states, dtype=np.float32)
         self._note_stillness(percept)
-        if self._is_exploring and self._is_by_model:
+        if self._is_learning and self._is_by_model:
             self._note_stuck()
-        if self._is_by_model and not self._detour:
+        self._is_by_curiosity = not self._is_by_model or self._detour > 0
+        if not self._is_by_curiosity:
             asked, x = self._best(states)
         else:
             asked = self._curiosity.act(percept)
             x = normalised(self._forward.predict(asked[None]), states, self._scales_m)[0]
             self._detour = max(0, self._detour - 1)
-        if self._is_exploring:
+        if self._is_learning:
             self._trace.append(x)
         self._intent = heading_of(asked)
         return self._intent
@@ -107,7 +114,7 @@ class ExpertSet:
     def _best(self, states: Array) -> tuple[Array, Array]:
         """Return the candidate of greatest expected utility, and the P it leads to."""
         model = self._models[self._subgoal]
-        asked = self._candidates.asked(self._rng.random() if self._is_exploring else 0.0)
+        asked = self._candidates.asked(self._rng.random() if self._is_learning else 0.0)
         x = normalised(self._forward.predict(asked), states, self._scales_m)
         weighted = x * model.weights
         best = int(np.argmax(model.rate_weighted(weighted) - self._boredom.of(weighted)))
@@ -140,9 +147,9 @@ class ExpertSet:
 
     def observe(self, result: StepResult, achieved: GoalState) -> None:
         """Take in what the step came to; achieved tells every goal that came about in this very step."""
-        self._forward.observe(self._intent, result, is_learning=self._is_exploring)
+        self._forward.observe(self._intent, result, is_learning=self._is_learning)
         self._n_steps += 1
-        if not self._is_exploring:
+        if not self._is_learning:
             return
         if self._n_steps % REMEMBER_EVERY == 0:
             self._memory.add(self._trace[-1])
@@ -156,7 +163,7 @@ class ExpertSet:
         A blocked trial says nothing against the skill, not even where the arm got stuck, nor does a miss that was no
         fair try, as with a full hand; a void one says nothing at all.
         """
-        if not self._is_exploring or outcome is TrialOutcome.VOID:
+        if not self._is_learning or outcome is TrialOutcome.VOID:
             return
         model = self._models[self._subgoal]
         is_missed = outcome is TrialOutcome.NOT_REACHED

@@ -71,14 +71,15 @@ class GoalSelector:
     def update(self, attempt: Attempt) -> None:
         """Learn from one trial. A void one is evidence about nothing."""
         if self._config.credit == "subgoal" and attempt.outcome is not TrialOutcome.VOID:
-            is_achieved = attempt.outcome is TrialOutcome.ACHIEVED
-            self._credit(attempt.subgoal, predicted=attempt.predicted, is_achieved=is_achieved)
+            worth = self._config.explored_worth if attempt.is_explored else 1.0
+            result = worth * (attempt.outcome is TrialOutcome.ACHIEVED)
+            self._credit(attempt.subgoal, predicted=attempt.predicted, result=result)
 
     def end_epoch(self, goal: int, *, predicted: float, is_achieved: bool) -> None:
         """Learn from one epoch that was not void; predicted is the chance of its goal said at the epoch's start."""
         self._epochs[goal].append(float(is_achieved))
         if self._config.credit == "main_goal":
-            self._credit(goal, predicted=predicted, is_achieved=is_achieved)
+            self._credit(goal, predicted=predicted, result=float(is_achieved))
 
     def rearm(self, goals: Iterable[int]) -> None:
         """Raise the values of goals whose believed needs have changed, where the config asks for it."""
@@ -86,9 +87,8 @@ class GoalSelector:
             for goal in goals:
                 self._values[goal] = max(float(self._values.max()), self._config.rearm_value)
 
-    def _credit(self, goal: int, *, predicted: float, is_achieved: bool) -> None:
+    def _credit(self, goal: int, *, predicted: float, result: float) -> None:
         expected = predicted if self._config.prediction == "expert_utility" else self.success(goal)
-        result = float(is_achieved)
         self._cp[goal].append(expected - result)
         self._results[goal].append(result)
         self._values[goal] += self._config.ema_rate * (self.improvement(goal) - self._values[goal])

@@ -49,6 +49,8 @@ class Attempt(msgspec.Struct, frozen=True, kw_only=True):
     skill: float
     """The expert's own measured chance of success where nothing blocks it, in [0, 1]."""
     n_steps: int
+    is_explored: bool = False
+    """Curiosity moved the arm when the trial ended, and not the sub-goal's model."""
 
 
 class SubgoalSelector(Protocol):
@@ -92,6 +94,11 @@ class Experts(Protocol):
 
     Sees P(t), the shaped target, intents and whether the fingers are moving; goals are indices.
     """
+
+    @property
+    def is_exploring(self) -> bool:
+        """Whether curiosity, and not the sub-goal's model, chose the newest intent."""
+        ...
 
     def begin_trial(self, subgoal: int, percept: Percept, *, explore: bool) -> None:
         """Start a trial. With explore=False: greedy, draws nothing, changes nothing learnt."""

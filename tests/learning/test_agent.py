@@ -4,6 +4,7 @@ import math
 
 import msgspec
 import numpy as np
+import pytest
 
 from config.learning import Experiment
 from learning.agent import RISEN_WITHIN_M, Agent
@@ -128,6 +129,12 @@ class Told(Idle):
         self.told.append(is_fair)
 
 
+class Curious(ToyExperts):
+    """Says that curiosity moved the arm."""
+
+    is_exploring = True
+
+
 def skilled(kind=ToyExperts):
     experts = kind(np.random.default_rng(0))
     experts.load_state_dict({**experts.state_dict(), "worth": 9.0 * np.eye(N_GOALS)})
@@ -166,6 +173,12 @@ def test_an_epoch_has_eight_trials_at_most_and_a_trial_seventy_steps():
     assert outcomes(record) == [TrialOutcome.NOT_REACHED] * 8
     assert [entry.attempt.n_steps for entry in record.trials] == [70] * 8
     assert record.n_steps == 560
+
+
+@pytest.mark.parametrize(("kind", "expected"), [(ToyExperts, False), (Curious, True)])
+def test_an_attempt_tells_who_moved_the_arm(kind, expected):
+    record = learn(agent_for(0, (0,), experts=skilled(kind)))
+    assert [entry.attempt.is_explored for entry in record.trials] == [expected]
 
 
 def test_what_was_achieved_stays_in_the_state_for_the_epoch_and_only_for_it():

@@ -93,3 +93,15 @@ def test_a_void_trial_leaves_every_model_bit_for_bit_as_it_was(skilled):
     for one, other in zip(before, after, strict=True):
         assert (one["successes"]["y"] == other["successes"]["y"]).all()
         assert all((a == b).all() for a, b in zip(one["network"]["weights"], other["network"]["weights"], strict=True))
+
+
+def test_who_moved_the_arm_is_told(skilled):
+    percept = skilled.table.reset(seed=1400, epoch=1)
+    skilled.experts.begin_trial(RED, percept, explore=False)
+    skilled.experts.act(percept)
+    assert not skilled.experts.is_exploring
+    unskilled = Hand()
+    percept = unskilled.table.reset(seed=1400, epoch=1)
+    unskilled.experts.begin_trial(RED, percept, explore=True)
+    unskilled.experts.act(percept)
+    assert unskilled.experts.is_exploring

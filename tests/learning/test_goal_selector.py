@@ -18,11 +18,11 @@ def selector(*, seed=0, n_goals=3, **config):
     )
 
 
-def attempt(subgoal, *, is_achieved, goal=0, predicted=0.5, outcome=None):
+def attempt(subgoal, *, is_achieved, goal=0, predicted=0.5, outcome=None, is_explored=False):
     return Attempt(
         epoch=0, goal=goal, subgoal=subgoal, state=(False,) * 3, state_after=(False,) * 3,
         outcome=outcome or (TrialOutcome.ACHIEVED if is_achieved else TrialOutcome.NOT_REACHED),
-        predicted=predicted, skill=0.5, n_steps=10,
+        predicted=predicted, skill=0.5, n_steps=10, is_explored=is_explored,
     )  # fmt: skip
 
 
@@ -57,6 +57,16 @@ def test_running_success_may_predict_in_place_of_the_expert():
     feed(bandit, 0, [1, 1], predicted=0.123)
     # The first attempt was predicted at 0 (nothing known), the second at 1: errors 1 and 0.
     assert bandit.improvement(0) == pytest.approx(0.0 - 1.0)
+
+
+def test_what_curiosity_achieved_may_be_worth_less_than_what_the_model_did():
+    half = selector(explored_worth=0.5)
+    feed(half, 1, [1, 0], is_explored=True)
+    feed(half, 1, [1, 1])
+    assert half.success(1) == pytest.approx((0.5 + 0.0 + 1.0 + 1.0) / 4)
+    whole = selector()
+    feed(whole, 1, [1, 0], is_explored=True)
+    assert whole.success(1) == pytest.approx(0.5)
 
 
 def test_an_attempt_is_credited_to_the_subgoal_or_a_whole_epoch_to_the_main_goal():

@@ -234,6 +234,10 @@ class ToyExperts:
         self._subgoal = self._lamp = 0
         self._explore = False
 
+    @property
+    def is_exploring(self) -> bool:
+        return False
+
     def begin_trial(self, subgoal: int, percept: Percept, *, explore: bool) -> None:
         self._subgoal, self._explore = subgoal, explore
         worth = self._worth[subgoal]
