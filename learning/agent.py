@@ -10,7 +10,7 @@ from typing import Any, Protocol
 import msgspec
 
 from config.learning import Experiment
-from learning.interfaces import Attempt, Experts, GoalState, SubgoalSelector, TrialOutcome
+from learning.interfaces import Attempt, Experts, GoalState, Kept, SubgoalSelector, TrialOutcome
 from learning.stopwatch import Stopwatch
 from robot.messages import Heading, Percept
 from robot.station import Station
@@ -23,7 +23,7 @@ RETREAT_STEPS = 20
 RISEN_WITHIN_M = 0.012
 
 
-class GoalSelector(Protocol):
+class GoalSelector(Kept, Protocol):
     """The bandit over goals, and the competence that sets the sub-goal selector's temperature."""
 
     def select(self) -> int:
@@ -44,14 +44,6 @@ class GoalSelector(Protocol):
 
     def rearm(self, goals: Iterable[int]) -> None:
         """Take up goals again whose believed needs have changed."""
-        ...
-
-    def state_dict(self) -> dict[str, Any]:
-        """Return everything learnt and the generator's state."""
-        ...
-
-    def load_state_dict(self, state: dict[str, Any]) -> None:
-        """Restore bit for bit."""
         ...
 
 

@@ -7,7 +7,7 @@ import msgspec
 
 from robot.messages import Heading, Percept, StepResult
 
-__all__ = ["Attempt", "Experts", "GoalState", "SubgoalSelector", "TrialOutcome"]
+__all__ = ["Attempt", "Experts", "GoalState", "Kept", "SubgoalSelector", "TrialOutcome"]
 
 GoalState = tuple[bool, ...]
 """Which goals were achieved during the current epoch (latched), by goal index."""
@@ -53,11 +53,20 @@ class Attempt(msgspec.Struct, frozen=True, kw_only=True):
     """Curiosity moved the arm when the trial ended, and not the sub-goal's model."""
 
 
-class SubgoalSelector(Protocol):
-    """Chooses the sub-goal of each trial.
+class Kept(Protocol):
+    """What a checkpoint holds. State_dicts hold None, bool, int, float, str, list, dict and numpy arrays only."""
 
-    State_dicts hold None, bool, int, float, str, list, dict and numpy arrays only.
-    """
+    def state_dict(self) -> dict[str, Any]:
+        """Return everything learnt and the generators' states."""
+        ...
+
+    def load_state_dict(self, state: dict[str, Any]) -> None:
+        """Restore bit for bit."""
+        ...
+
+
+class SubgoalSelector(Kept, Protocol):
+    """Chooses the sub-goal of each trial."""
 
     def select(
         self, *, goal: int, state: GoalState, available: tuple[bool, ...], temperature: float, explore: bool
@@ -80,16 +89,8 @@ class SubgoalSelector(Protocol):
         """Return the goals for which what they are believed to need was revised by the last update."""
         ...
 
-    def state_dict(self) -> dict[str, Any]:
-        """Return everything learnt and the generator's state."""
-        ...
 
-    def load_state_dict(self, state: dict[str, Any]) -> None:
-        """Restore bit for bit."""
-        ...
-
-
-class Experts(Protocol):
+class Experts(Kept, Protocol):
     """All experts of a learner, one utility model a goal.
 
     Sees P(t), the shaped target, intents and whether the fingers are moving; goals are indices.
@@ -122,12 +123,4 @@ class Experts(Protocol):
 
     def skill(self, subgoal: int) -> float:
         """Return the measured chance of success where nothing blocks, in [0, 1]."""
-        ...
-
-    def state_dict(self) -> dict[str, Any]:
-        """Return everything learnt and the generators' states."""
-        ...
-
-    def load_state_dict(self, state: dict[str, Any]) -> None:
-        """Restore bit for bit."""
         ...

@@ -63,18 +63,8 @@ class World(Protocol):
         ...
 
 
-class Loop(Protocol):
-    """What holds the arm, tick by tick: in this process or in another."""
-
-    @property
-    def is_in_contact(self) -> bool:
-        """Whether something holds the tool up."""
-        ...
-
-    @property
-    def why_lost(self) -> str | None:
-        """Why command was lost between time steps since it was taken, None where it was not."""
-        ...
+class Holder(Protocol):
+    """What holds the arm, in this process or in another."""
 
     def connect(self) -> None:
         """Acquire the arm. Moves nothing."""
@@ -84,12 +74,30 @@ class Loop(Protocol):
         """Take command of the arm, unless it is ours already."""
         ...
 
-    def begin_epoch(self, epoch: int) -> int:
-        """Take up an epoch's rules and return the outputs it begins with."""
+    @property
+    def why_lost(self) -> str | None:
+        """Why command was lost between time steps since it was taken, None where it was not."""
         ...
 
     def stop(self) -> None:
         """Stop the arm and give up command."""
+        ...
+
+    def close(self) -> None:
+        """Stop and release the arm. Idempotent, never raises."""
+        ...
+
+
+class Loop(Holder, Protocol):
+    """Who holds the arm and moves it, tick by tick."""
+
+    @property
+    def is_in_contact(self) -> bool:
+        """Whether something holds the tool up."""
+        ...
+
+    def begin_epoch(self, epoch: int) -> int:
+        """Take up an epoch's rules and return the outputs it begins with."""
         ...
 
     def seed(self) -> ArmState:
@@ -98,10 +106,6 @@ class Loop(Protocol):
 
     def stride(self, intent: Intent, grip: GripCommand, *, n_ticks: int, wait_at_m: Vec3 | None = None) -> Stride:
         """Carry out an intent for so many ticks."""
-        ...
-
-    def close(self) -> None:
-        """Stop and release the arm. Idempotent, never raises."""
         ...
 
 

@@ -1,5 +1,6 @@
 """The project as a whole: packages, public names, sub-commands, pins."""
 
+import ast
 import importlib
 import os
 import pkgutil
@@ -20,12 +21,13 @@ ROOMS = ("config", "learning", "perception", "robot", "sim_twin")
 EDGES = {
     "agent", "assembly", "assess", "bench", "checkpoint", "cli", "consent", "ended", "errors", "evaluation",
     "evaluation_pool", "experiment", "explain", "figures", "goals", "metrics", "progress", "provenance", "report",
-    "robot_hours", "rows", "run_folder", "seeds", "session", "stop_request", "stopwatch", "tables", "telling", "wanted",
-    "wired",
+    "robot_hours", "rows", "run_folder", "seeds", "session", "stop_request", "stopwatch", "tables", "telling",
+    "time_spent", "wanted", "wired",
 }  # fmt: skip
 """Modules of learning that hold nothing learnt: what runs the learner, judges it, keeps it or tells of it."""
 OWN_KEYS = {"config.learning", "config.values"}
 """All that what is learnt may read of the config."""
+MOST_METHODS = 7
 LISTED = PROJECT["tool"]["setuptools"]["packages"]
 
 
@@ -156,3 +158,12 @@ def test_the_fence_holds_what_it_says(tmp_path, module, line, is_kept):
     )  # fmt: skip
     assert (result.returncode == 0) is is_kept, result.stdout + result.stderr
     assert is_kept or f"{fence()['name']} BROKEN" in result.stdout
+
+
+@pytest.mark.parametrize("room", ROOMS)
+def test_no_door_has_more_than_seven_methods_of_its_own(room):
+    for path in sorted((ROOT / room).rglob("*.py")):
+        for node in ast.walk(ast.parse(path.read_text())):
+            if isinstance(node, ast.ClassDef) and any(ast.unparse(base) == "Protocol" for base in node.bases):
+                methods = [line for line in node.body if isinstance(line, ast.FunctionDef)]
+                assert len(methods) <= MOST_METHODS, f"{path.relative_to(ROOT)}: {node.name} has {len(methods)}"
