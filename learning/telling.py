@@ -40,10 +40,12 @@ def _era_line(era: EraSummary, *, is_first: bool) -> str:
 
 
 def report_table(report: Report) -> Table:
-    """Return a table of all groups and sets of rules: median [least to greatest] over runs."""
-    table = Table(
+    """Return a table of all groups and sets of rules: how many learnt over its 95 % interval, median over range."""
+    table = Table(show_lines=True)
+    for heading in (
         "learner", "rules from", "learnt", "after epochs", "graph right after", "trials over optimum", "success"
-    )
+    ):  # fmt: skip
+        table.add_column(heading, overflow="fold")
     for group in report.groups:
         for era in group.eras:
             table.add_row(
@@ -127,7 +129,7 @@ def profile_table(spent: TimeSpent) -> Table:
 
 
 def _count(count: Count) -> str:
-    return f"{count.n}/{count.of} ({count.share_low:.0%}–{count.share_high:.0%})"
+    return f"{count.n}/{count.of}\n{100 * count.share_low:.0f}–{count.share_high:.0%}"
 
 
 def _spread(spread: Spread | None, form: str) -> str:
@@ -136,4 +138,4 @@ def _spread(spread: Spread | None, form: str) -> str:
     middle = form.format(spread.median)
     if spread.of == 1:
         return middle
-    return f"{middle} [{form.format(spread.least)} to {form.format(spread.greatest)}]"
+    return f"{middle}\n{form.format(spread.least)} to {form.format(spread.greatest)}"
