@@ -11,9 +11,10 @@ from typing import Any
 import numpy as np
 
 from config.learning import SubgoalSelection
+from learning.choice import draw
 from learning.controls import Controls, Probe, Spot, probe_of, violations
 from learning.graph import Finding, Graph
-from learning.preconditions import START, Situation
+from learning.preconditions import START, Needs, Situation
 
 __all__ = ["Curiosity", "most_hopeful_step", "random_walks"]
 
@@ -22,10 +23,14 @@ FADE = 0.998
 """How much of the memory of past probes is left after an epoch."""
 WAKING = 0.5
 """Share of curiosity that one surprise brings back."""
-TIRING = 0.97
-"""How much of it is left after a probe."""
+N_SUSPICIONS = 3
+"""Suspicions drawn when a probe is looked for."""
 SURPRISE = 0.1
 """A result that had been given less than this chance is suspect."""
+LITTLE = 0.3
+"""Tries that make no difference."""
+TIRING = 0.97
+"""How much of it is left after a probe."""
 
 
 NOTHING: Mapping[Spot, float] = {}
@@ -117,44 +122,78 @@ class Curiosity:
     # ------------------------------------------------------------------------------------------------------ probes
 
     def _begin(self, goal: int, graph: Graph) -> Probe | None:
-        """Return a probe after which the epoch's goal can still be achieved within the trials, or None."""
+        """Return a probe for an epoch with a goal, or None."""
         self._tries = {key: FADE * n for key, n in self._tries.items()}
         chance = self._rng.random()
         if chance < self._config.retest:
-            probe = self._retest(graph)
+            probe = self._retest(goal, graph)
         elif chance < self._config.retest + self._config.curiosity * self._interest:
             probe = self._controls.begin(graph, lambda probe: self._fits(probe, goal, graph)) or self._most_doubtful(
                 goal, graph
             )
         else:
             probe = None
-        if probe is None or not self._fits(probe, goal, graph):
+        if probe is None:
             return None
         self._interest *= TIRING
         self._tries[probe.spot] = self._tries.get(probe.spot, 0.0) + graph.skill(probe.steps[-1])
         return probe
 
     def _most_doubtful(self, goal: int, graph: Graph) -> Probe | None:
-        """Return the probe of most doubt per trial that is met on random walks, or None where there is little doubt."""
+        """Return the probe of most doubt per trial, or None where there is little doubt.
+
+        It is one that random walks come by, or the test of one suspicion, to which no walk and no plan might ever lead.
+        """
         best, best_value = None, self._config.least_doubt
+        for probe, doubt in (*self._met_on_walks(graph), *self._suspected(graph)):
+            value = doubt / len(probe.steps)
+            if value > best_value and self._fits(probe, goal, graph):
+                best, best_value = probe, value
+        return best
+
+    def _met_on_walks(self, graph: Graph) -> Iterator[tuple[Probe, float]]:
+        """Yield the most doubtful goal of each situation that random walks lead to, and how doubtful it is."""
         known: dict[Situation, np.ndarray] = {}
         for steps, here in random_walks(START, graph, n_walks=N_WALKS, length=self._config.probe_trials, rng=self._rng):
             if here not in known:
                 known[here] = self._doubts(here, graph)
             doubtful = int(np.argmax(known[here]))
-            value = float(known[here][doubtful]) / (len(steps) + 1)
-            probe = Probe((*steps, doubtful), here)
-            if value > best_value and self._fits(probe, goal, graph):
-                best, best_value = probe, value
-        return best
+            yield Probe((*steps, doubtful), here), float(known[here][doubtful])
 
-    def _retest(self, graph: Graph) -> Probe | None:
-        """Return a probe of one believed literal, drawn at random: the goal is tried with only that one violated."""
+    def _suspected(self, graph: Graph) -> Iterator[tuple[Probe, float]]:
+        """Yield the test of one suspicion, drawn by how probable it is, and its doubt.
+
+        What must be off goes unnoticed as long as no plan has it on, and what must be on while every plan has it on. So
+        the goal is tried with all that it is believed to need, and the contrary of one more literal.
+        """
+        suspicions = np.array([belief.marginals() for belief in graph.beliefs])  # (n, n, 2): goal, literal, on or off
+        for goal in range(graph.n_goals):
+            needs, was_achieved = graph.most_probable(goal), graph.beliefs[goal].was_achieved
+            is_new = [i != goal and was_achieved and not (needs.on | needs.off) >> i & 1 for i in range(graph.n_goals)]
+            suspicions[goal] *= np.array(is_new)[:, None]
+        if not suspicions.any():
+            return
+        for _ in range(N_SUSPICIONS):
+            drawn = draw(suspicions.ravel() / suspicions.sum(), self._rng)
+            goal, i, is_off = (int(index) for index in np.unravel_index(drawn, suspicions.shape))
+            needs = graph.most_probable(goal)
+            contrary = Needs(needs.on | 1 << i, needs.off) if is_off else Needs(needs.on, needs.off | 1 << i)
+            probe = probe_of(goal, contrary, graph)
+            if probe is not None:
+                yield probe, float(self._doubts(probe.situation, graph)[goal])
+
+    def _retest(self, goal: int, graph: Graph) -> Probe | None:
+        """Return the probe of a believed literal, of those least tried: a goal is tried with only that one violated.
+
+        The epoch may be given to it: with some literals violated hardly any goal can be achieved after it.
+        """
         violated = [(g, way) for g in range(graph.n_goals) for way in violations(graph.most_probable(g))]
-        if not violated:
+        ways = [probe for tried in violated if (probe := probe_of(*tried, graph)) and self._is_way(probe, goal)]
+        if not ways:
             return None
-        goal, way = violated[int(self._rng.integers(len(violated)))]
-        return probe_of(goal, way, graph)
+        tries = np.array([self._tries.get(probe.spot, 0.0) for probe in ways])
+        least = np.flatnonzero(tries <= tries.min() + LITTLE)
+        return ways[least[int(self._rng.integers(len(least)))]]
 
     def _doubts(self, here: Situation, graph: Graph) -> np.ndarray:
         """Return how doubtful each goal not yet achieved is, less the more often it was probed.  () -> (n,)"""
@@ -171,16 +210,23 @@ class Curiosity:
     def _fits(self, probe: Probe, goal: int, graph: Graph) -> bool:
         """Whether the epoch's goal can be achieved after a probe, however that ends, within the trials.
 
-        On the way to the doubtful goal it must not be: there the epoch would end.
+        On the way to the doubtful goal it must not be: there the epoch would end. An epoch may be given to what its own
+        goal needs, though it fail for that.
         """
-        if goal in probe.steps[:-1]:
-            return False
         tried = probe.steps[-1]
+        if not self._is_way(probe, goal):
+            return False
+        if tried == goal:
+            return True
         for end in (probe.situation, probe.situation.after(tried, graph.undone(tried))):
             rest = () if end.latched >> goal & 1 else graph.plan(goal, end)
             if rest is None or len(probe.steps) + len(rest) > self._config.probe_trials:
                 return False
         return True
+
+    def _is_way(self, probe: Probe, goal: int) -> bool:
+        """Whether a probe can be seen through: the epoch ends with its goal, or with its last trial."""
+        return goal not in probe.steps[:-1] and len(probe.steps) <= self._config.probe_trials
 
     def state_dict(self) -> dict[str, Any]:
         """Return all memory; the generator belongs to the selector."""

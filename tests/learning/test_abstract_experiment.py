@@ -85,6 +85,21 @@ def test_rules_drawn_at_random_are_learnt(default, seed):
     assert result.recovered is not None
 
 
+@pytest.mark.parametrize("seed", [0, 2])
+def test_three_stages_are_learnt_and_a_not_at_the_end_of_them_is_found_out(default, seed):
+    """No plan has goals 0 and 3 on together, so that only who tries finds out that goal 0 shuts goal 8."""
+    free = needs()
+    before = (free, free, free, free, needs([0]), needs([1], [2]), free, needs([4]), needs([3, 5], [0]))
+    after = (free, free, free, free, needs(off=[0]), needs([7], [2]), free, needs([4]), needs([3, 5]))
+    result = run(
+        default, seed, epochs=400, before=before, after=after, grabs=frozenset({4, 5, 6}), carried={7: 4, 8: 5}
+    )
+    assert result.learnt is not None
+    assert result.learnt <= 300
+    assert result.recovered is not None
+    assert result.right_before is not None
+
+
 def test_a_need_that_falls_away_is_noticed_though_nothing_fails(default):
     rng = np.random.default_rng(0)
     table, learner = _table_and_learner(default, rng)
