@@ -42,7 +42,8 @@ class LinkWatch:
 
     def is_cut(self) -> bool:
         """Return whether any of them was hung up by the other side, or broke. Takes some microseconds."""
-        return any(events & _CUT for _, events in self._poll.poll(0))
+        events = self._poll.poll(0)
+        return bool(events) and any(bits & _CUT for _, bits in events)
 
     def forget(self) -> None:
         """Watch nothing any more."""

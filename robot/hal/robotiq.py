@@ -22,6 +22,8 @@ HELD_WHILE_CLOSING = 2
 MOVING = 0
 READY = 3
 """STA: 0 reset, 1 activating, 3 active."""
+ASK_EVERY = 8
+"""Polls from question to question: at 500 of them a second a hand is seen every 16 ms."""
 SILENT_LIMIT = 200
 """Polls without an answer after which the gripper counts as gone."""
 
@@ -72,7 +74,7 @@ class RobotiqGripper:
         self._grip: GripCommand | None = None
         self._asked: tuple[int, int, int] | None = None
         self._is_query_out = False
-        self._n_silent = 0
+        self._n_silent, self._n_since_asked = 0, ASK_EVERY
         self.state: GripState | None = None
         self.n_answers = 0
 
@@ -85,7 +87,7 @@ class RobotiqGripper:
         self._received = self._outgoing = b""
         self._said.clear()
         self._grip = self._asked = self.state = None
-        self._is_query_out, self._n_silent = False, 0
+        self._is_query_out, self._n_silent, self._n_since_asked = False, 0, ASK_EVERY
         try:
             self._socket = socket.create_connection((host, GRIPPER_PORT), timeout=timeout_s)
         except OSError as error:
@@ -116,16 +118,21 @@ class RobotiqGripper:
             position, speed, force = asked
             self._send(f"SET SPE {speed} FOR {force} POS {position} GTO 1\n")
 
-    def poll(self) -> GripState | None:
-        """Ask the next question or take in answers, in turn, and return the newest state.
+    def poll(self, *, is_awaited: bool = False) -> GripState | None:
+        """Ask the next question if it is time, or take in answers, and return the newest state.
+
+        Args:
+            is_awaited: ask as soon as the last question is answered.
 
         Raises:
             WireError: the gripper closed the connection or has been silent for too long.
         """
         self._flush()
+        self._n_since_asked += 1
         if not self._is_query_out:
-            self._send("GET POS\nGET OBJ\nGET STA\nGET ACT\n")
-            self._is_query_out, self._n_silent = True, 0
+            if is_awaited or self._n_since_asked >= ASK_EVERY:
+                self._send("GET POS\nGET OBJ\nGET STA\nGET ACT\n")
+                self._is_query_out, self._n_silent, self._n_since_asked = True, 0, 0
             return self.state
         self._receive()
         self._n_silent += 1

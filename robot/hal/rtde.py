@@ -86,6 +86,8 @@ class RtdeArm:
         self._is_lost = False
         self._runtime = Runtime.STOPPED
         """As the last state read told."""
+        self._modes, self._mode = (-1, 0), mode_of(-1, 0)
+        self._is_hand_asked = False
 
     # ----------------------------------------------------------------------------------------------------- acquire
 
@@ -151,11 +153,11 @@ class RtdeArm:
         receive, _ = self._reading()
         self._require_link()
         self._note_freshness(receive)
-        grip = self._poll_hand()
-        if grip is None:
-            raise StaleStateError("arm: expected a state of the hand, none came yet")
-        status = self.status()
-        self._runtime = status.runtime
+        grip = self._grip_now()
+        self._runtime = int(receive.getRuntimeState())
+        modes = receive.getRobotMode(), receive.getSafetyStatusBits()
+        if modes != self._modes:
+            self._modes, self._mode = modes, mode_of(*modes)
         x, y, z, rx, ry, rz = receive.getActualTCPPose()
         fx, fy, fz, *_ = receive.getActualTCPForce()
         return ArmState(
@@ -168,7 +170,7 @@ class RtdeArm:
             grip=grip,
             digital_in=self._pins.signals_in(receive.getActualDigitalInputBits() & _ALL_BITS),
             digital_out=self._pins.signals_out(receive.getActualDigitalOutputBits() & _ALL_BITS),
-            mode=mode_of(status),
+            mode=self._mode,
         )
 
     def write(self, command: ArmCommand) -> None:
@@ -178,11 +180,13 @@ class RtdeArm:
             NotEngagedError: nobody took command, or the arm was stopped since.
             ArmRefusedError: the program that obeys has ended, or the controller did not take it.
             StaleStateError: the link was cut, or sending took so long that the client may have reconnected.
+            WireError: the hand does not answer.
         """
         if self._control is None:
             raise NotEngagedError("arm: expected connect() and engage() before write(), and again after a stop")
         self._require_link()
-        self._require(self._runtime == Runtime.PLAYING, "servoJ")
+        if self._runtime != Runtime.PLAYING:
+            self._refuse("servoJ")
         servo, begun_ns = self._arm.servo, monotonic_ns()
         taken = self._control.servoJ(
             list(command.q_rad), 0.0, 0.0, 1.0 / RATE_HZ, servo.lookahead_s, servo.gain
@@ -194,12 +198,15 @@ class RtdeArm:
                 f"servoJ: expected it sent within {WRITE_NS / 1e6:g} ms, it took {spent_ns / 1e6:.0f} ms; the client "
                 "may have reconnected by itself"
             )
-        self._require(taken, "servoJ")
+        if not taken:
+            self._refuse("servoJ")
         self._gripper.command(command.grip)
         assert self._outputs is not None, "engage made it"
         pins = self._pins.pins_out(command.digital_out, self._outputs.bits, now_ns=monotonic_ns())
         untaken = self._outputs.put(pins)
-        self._require(untaken is None, f"digital output {untaken}")
+        if untaken is not None:
+            self._refuse(f"digital output {untaken}")
+        self._ask_hand()
 
     def stop(self) -> bool:
         """Bring the arm to rest and give up command; the hand keeps its grip. Returns whether rest was seen.
@@ -259,15 +266,25 @@ class RtdeArm:
                 f"arm: expected a state every 2 ms, the newest is {age_ms:.0f} ms old; is the link up?"
             )
 
-    def _poll_hand(self) -> GripState | None:
+    def _ask_hand(self) -> None:
+        """Let the hand have its turn after the command has gone out, and none in the next read."""
+        self._gripper.poll()
+        self._is_hand_asked = True
+
+    def _grip_now(self) -> GripState:
         """Return what the hand says; after a pause wait for what it says now, the next answer being of before."""
         now_ns, hand = monotonic_ns(), self._gripper
         is_late, self._polled_ns = now_ns - self._polled_ns > STALE_NS, now_ns
-        fresh, deadline_ns = hand.n_answers + 2, now_ns + HAND_NS
-        while is_late and hand.n_answers < fresh and monotonic_ns() < deadline_ns:
-            hand.poll()
-            self.clock.wait_tick()
-        return hand.poll()
+        is_asked, self._is_hand_asked = self._is_hand_asked, False
+        if is_late:
+            fresh, deadline_ns = hand.n_answers + 2, now_ns + HAND_NS
+            while hand.n_answers < fresh and monotonic_ns() < deadline_ns:
+                hand.poll(is_awaited=True)
+                self.clock.wait_tick()
+        grip = hand.state if is_asked else hand.poll()
+        if grip is None:
+            raise StaleStateError("arm: expected a state of the hand, none came yet")
+        return grip
 
     def _wait_first_state(self) -> None:
         deadline_ns = monotonic_ns() + round(START_S * 1e9)
@@ -323,8 +340,8 @@ class RtdeArm:
             with suppress(RuntimeError):
                 self._dashboard.stop()
 
-    def _require(self, is_taken: bool, what: str) -> None:
-        require(is_taken, what, receive=self._reading()[0], clock=self.clock)
+    def _refuse(self, what: str) -> None:
+        require(False, what, receive=self._reading()[0], clock=self.clock)
 
     def _wait_rest(self) -> bool:
         """Wait until the joints rest, at most REST_S. Returns whether they do."""

@@ -31,6 +31,8 @@ class DigitalOutputs:
     def put(self, bits: int) -> int | None:
         """Switch the outputs that differ; return the first that the controller did not take, None where it took all."""
         changed = self.bits ^ bits
+        if not changed:
+            return None
         for i in range(N_OUTPUTS):
             if not changed >> i & 1:
                 continue

@@ -56,20 +56,24 @@ class UrStatus(msgspec.Struct, frozen=True, kw_only=True):
     """Of the speed slider and whatever else slows motion down."""
 
 
-def mode_of(status: UrStatus) -> ArmMode:
+def mode_of(robot_mode: int, safety_bits: int) -> ArmMode:
     """Return our mode for the controller's."""
-    if status.safety_bits & _EMERGENCY:
+    if safety_bits & _EMERGENCY:
         return ArmMode.EMERGENCY_STOP
-    if status.safety_bits & _STOPPED:
+    if safety_bits & _STOPPED:
         return ArmMode.PROTECTIVE_STOP
-    if status.robot_mode == RUNNING:
+    if robot_mode == RUNNING:
         return ArmMode.RUNNING
-    return ArmMode.IDLE if status.robot_mode == IDLE else ArmMode.STOPPED
+    return ArmMode.IDLE if robot_mode == IDLE else ArmMode.STOPPED
+
+
+def _mode_in(status: UrStatus) -> ArmMode:
+    return mode_of(status.robot_mode, status.safety_bits)
 
 
 def is_well(status: UrStatus) -> bool:
     """Return whether nothing in a state says why the controller should not obey."""
-    return mode_of(status) is ArmMode.RUNNING and status.runtime == Runtime.PLAYING
+    return _mode_in(status) is ArmMode.RUNNING and status.runtime == Runtime.PLAYING
 
 
 def why_refused(status: UrStatus) -> str:
@@ -90,7 +94,7 @@ def check_ready(status: UrStatus, *, is_remote: bool) -> None:
     """
     if not is_remote:
         raise ArmRefusedError("expected the arm in remote control, it is in local: switch it at the top right corner")
-    if mode_of(status) is not ArmMode.RUNNING:
+    if _mode_in(status) is not ArmMode.RUNNING:
         raise ArmRefusedError(f"expected an arm that runs and is not stopped, came: {why_refused(status)}")
     if status.runtime not in (Runtime.STOPPED, Runtime.STOPPING):
         raise ArmRefusedError("expected no program on the arm, one is running: whoever started it must stop it")

@@ -15,7 +15,8 @@ SPEED_SHARE = 0.95
 ALIGN_RAD = 0.01
 """A tool tilted or turned by less than this points down as far as motion cares; the next tick sets it right."""
 SWIFT_TICK_S = 0.005
-"""Shorter ticks than this take the closed form of the inverse, where the arm has one: a real arm's, not the twin's."""
+"""Shorter ticks than this, a real arm's and not the twin's, take the closed form of the inverse where the arm has one,
+and find the way to a new target one tick after it was set: the tick in which an intent begins has enough to do."""
 STILL_RAD_S = 1e-3
 ALIGN_STEP_RAD = 0.35
 """Greatest change of any joint's target in one step while the tool is brought upright."""
@@ -39,7 +40,8 @@ class Follower:
 
     def __init__(self, arm: ArmConfig, *, tick_s: float) -> None:
         motion, joints = arm.motion, arm.joints
-        self._kinematics = Kinematics(arm, is_swift=tick_s < SWIFT_TICK_S)
+        self._is_swift = tick_s < SWIFT_TICK_S
+        self._kinematics = Kinematics(arm, is_swift=self._is_swift)
         self._home_yaw_rad = arm.tool_yaw_rad
         self._tick_s = tick_s
         self._tool = Limiter(
@@ -68,6 +70,7 @@ class Follower:
         self.target_m = self._kinematics.tcp(q_rad)
         self.yaw_rad = self._home_yaw_rad
         self._is_upright = self._is_solved = False
+        self._to_come: list[float] | None = None
         self._joints.seed(list(q_rad))
         self._take_up_tool()
 
@@ -94,7 +97,11 @@ class Follower:
         if not self._is_upright:
             self._take_up_tool()
         if self._is_upright:
-            self._tool.aim([*target_m, yaw_rad])
+            if self._is_swift:
+                self._is_due = self._to_come is not None  # targets that come every tick may not put it off for good
+                self._to_come = [*target_m, yaw_rad]
+            else:
+                self._tool.aim([*target_m, yaw_rad])
             self.target_m, self.yaw_rad = target_m, yaw_rad
             return True
         return self._align(target_m, yaw_rad)
@@ -118,6 +125,7 @@ class Follower:
     def brake(self) -> None:
         """Come to rest as soon as the limits allow."""
         if self._is_upright:
+            self._to_come = None
             x, y, z, self.yaw_rad = self._tool.brake()
             self.target_m = (x, y, z)
         else:
@@ -133,6 +141,8 @@ class Follower:
         return q
 
     def _step_tool(self) -> Vec6:
+        if self._to_come is not None:
+            self._take_target(self._to_come)
         before, now = self._tool.at, self._tool.step()
         if now == before and self._is_solved:
             return self.q_rad  # at rest: solving again would stir the last digits
@@ -147,6 +157,12 @@ class Follower:
             self.trouble = "unreachable"
             return _vec6(self._joints.step())
         return self._slow(q)
+
+    def _take_target(self, target: list[float]) -> None:
+        if self._is_due:
+            self._tool.aim(target)
+            self._to_come = None
+        self._is_due = True
 
     def _slow(self, q: Vec6) -> Vec6:
         """Hold the tool back where a joint would be too fast, as near the base; it goes on at the speed it was let."""
@@ -172,7 +188,7 @@ class Follower:
         yaw = unwound(turn_about_vertical(quat), self._home_yaw_rad)
         if abs(yaw - self._home_yaw_rad) < ALIGN_RAD:
             yaw = self._home_yaw_rad
-        self._is_upright = True
+        self._is_upright, self._to_come = True, None
         self._q_before_rad = self.q_rad
         self.target_m, self.yaw_rad = self._kinematics.tcp(self.q_rad), yaw
         self._tool.seed([*self.target_m, yaw])

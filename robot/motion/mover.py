@@ -8,7 +8,15 @@ from robot.geometry import inside_box
 from robot.messages import ArmState, Heading, Intent, JointTarget, Twist, Vec3, Vec6
 from robot.motion.contact import ContactGuard
 from robot.motion.follower import Follower
-from robot.motion.target import MAX_TURN_RAD, Shaped, TargetLimits, advance_heading, advance_twist, fence
+from robot.motion.target import (
+    MAX_TURN_RAD,
+    Shaped,
+    TargetLimits,
+    advance_heading,
+    advance_twist,
+    fence,
+    is_free,
+)
 from robot.motion.trail import Trail
 
 __all__ = ["Mover"]
@@ -139,7 +147,7 @@ class Mover:
         eased, is_eased = self._contact.ease(self._follower.target_m, shaped.position_m)
         if is_eased:
             self._limiters.append("contact")
-        fenced = fence(eased, self._leashed_to_m(state), self._limits)
+        fenced = self._fenced(eased, state)
         self._limiters.extend(fenced.limiters)
         if not self._follower.aim(fenced.position_m, yaw_rad):
             self._limiters.append("unreachable")
@@ -165,11 +173,17 @@ class Mover:
         if share < 1.0:
             self._limiters.append("max_step")
         tcp, lowest_m = follower.tcp_and_lowest(q)
-        fenced = fence(tcp, self._leashed_to_m(state), limits)
+        fenced = self._fenced(tcp, state)
         if fenced.limiters or lowest_m < limits.tip_min_m:
             self._limiters.extend(fenced.limiters or ("table",))
             return
         follower.aim_joints(q)
+
+    def _fenced(self, target_m: Vec3, state: ArmState) -> Shaped:
+        """Keep a target inside the workspace and on the leash; where that is held is found only if it matters."""
+        if is_free(target_m, state.tcp_position_m, self._limits, stray_m=STRAY_M):
+            return Shaped(target_m)
+        return fence(target_m, self._leashed_to_m(state), self._limits)
 
     def _leashed_to_m(self, state: ArmState) -> Vec3:
         """Return where the leash is held: where a free tool is by now, or at the tool where something keeps it away."""

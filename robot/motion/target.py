@@ -8,9 +8,10 @@ import math
 import msgspec
 
 from config.arm import ArmConfig
+from robot.geometry import inside_box
 from robot.messages import Box3, Heading, Twist, Vec3
 
-__all__ = ["Shaped", "TargetLimits", "advance_heading", "advance_twist", "fence", "guard"]
+__all__ = ["Shaped", "TargetLimits", "advance_heading", "advance_twist", "fence", "guard", "is_free"]
 
 MAX_TURN_RAD = 0.2
 """Greatest turn of the tool in one step."""
@@ -140,6 +141,19 @@ def fence(target_m: Vec3, tool_m: Vec3, limits: TargetLimits) -> Shaped:
         inside = (mx + (x - mx) * share, my + (y - my) * share, mz + (z - mz) * share)
         names.append("leash")
     return Shaped(inside, tuple(names))
+
+
+def is_free(target_m: Vec3, tool_m: Vec3, limits: TargetLimits, *, stray_m: float) -> bool:
+    """Return whether the fence leaves a target alone wherever the leash is held.
+
+    Args:
+        target_m: where the target would go, base frame.
+        tool_m: the measured tool.
+        limits: workspace and leash.
+        stray_m: how far from there the leash may be held.
+    """
+    is_near = math.dist(target_m, tool_m) <= limits.leash_m - stray_m - _TINY
+    return is_near and inside_box(target_m, *limits.workspace_m)
 
 
 def _move(at_m: Vec3, step_m: Vec3, limits: TargetLimits, duration_s: float, names: list[str]) -> Shaped:

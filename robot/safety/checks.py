@@ -40,6 +40,10 @@ __all__ = [
 N_JOINTS = 6
 REASON_M, REASON_RAD, REASON_M_S = 10.0, 1e3, 10.0
 """An intent beyond these is not large but wrong."""
+_INTENTS = (Heading, Twist, JointTarget, Hold)
+_MOST_HEADING = (REASON_RAD, REASON_M, REASON_M)
+_MOST_TWIST = (*(REASON_M_S,) * 3, *(REASON_RAD,) * 3)
+_MOST_JOINTS = (REASON_RAD,) * N_JOINTS
 
 
 class Reason(StrEnum):
@@ -74,7 +78,7 @@ class Refusal(msgspec.Struct, frozen=True):
 
 def check_intent(intent: object) -> Refusal | None:
     """Refuse what is no intent, is not finite or cannot be meant. Large but meant intents are shaped, not refused."""
-    if not isinstance(intent, Heading | Twist | JointTarget | Hold):
+    if not isinstance(intent, _INTENTS):
         return Refusal(Reason.MALFORMED, f"expected Heading, Twist, JointTarget or Hold, came {type(intent).__name__}")
     if not (intent.grip is None or isinstance(intent.grip, Grip)):
         return Refusal(Reason.MALFORMED, f"expected grip open, close or nothing, came {intent.grip!r}")
@@ -86,16 +90,16 @@ def check_intent(intent: object) -> Refusal | None:
 
 def _check_intent_values(intent: Heading | Twist | JointTarget | Hold) -> Refusal | None:
     if isinstance(intent, Heading):
-        values, most = (intent.heading_rad, intent.distance_m, intent.height_m), (REASON_RAD, REASON_M, REASON_M)
+        values, most = (intent.heading_rad, intent.distance_m, intent.height_m), _MOST_HEADING
     elif isinstance(intent, Twist):
-        values, most = (*intent.linear_m_s, *intent.angular_rad_s), (*(REASON_M_S,) * 3, *(REASON_RAD,) * 3)
+        values, most = (*intent.linear_m_s, *intent.angular_rad_s), _MOST_TWIST
     elif isinstance(intent, JointTarget):
-        values, most = tuple(intent.q_rad), (REASON_RAD,) * N_JOINTS
+        values, most = tuple(intent.q_rad), _MOST_JOINTS
     else:
         return None
     if len(values) != len(most):
         return Refusal(Reason.MALFORMED, f"expected {len(most)} numbers in {type(intent).__name__}, came {len(values)}")
-    if not all(math.isfinite(v) for v in values):
+    if not all(map(math.isfinite, values)):
         return Refusal(Reason.NOT_FINITE, f"expected finite numbers in {type(intent).__name__}, came {values}")
     for value, limit in zip(values, most, strict=True):
         if abs(value) > limit:

@@ -1,3 +1,4 @@
+import itertools
 import math
 
 import numpy as np
@@ -9,7 +10,7 @@ from robot.kinematics import Kinematics
 from robot.motion.follower import Follower
 
 ARM = load_arm("ur5e")
-DT = 0.01
+DT, FAST_DT = 0.01, 0.002
 KINEMATICS = Kinematics(ARM)
 START = (0.42, 0.0, 0.2)
 Q_START = KINEMATICS.solve(START, ARM.home_rad)
@@ -48,6 +49,38 @@ def test_the_tool_goes_straight_stays_upright_and_rests_on_the_target(follower):
     assert points[-1] == pytest.approx(target, abs=1e-5)
     for q in path[::10]:
         assert np.allclose(forward_kinematics(ARM, q)[:3, :3], tool_down(ARM.tool_yaw_rad), atol=1e-4)
+
+
+def test_at_a_real_arms_ticks_the_way_is_the_same_and_begins_one_tick_later():
+    rng = np.random.default_rng(1)
+    now, later = Follower(ARM, tick_s=FAST_DT), Follower(ARM, tick_s=FAST_DT)
+    now._is_swift = False
+    for follower in (now, later):
+        follower.seed(Q_START)
+    expected, path = [now.step()], []
+    for _ in range(20):
+        target = tuple((START + rng.uniform(-0.03, 0.03, 3)).tolist())
+        for follower in (now, later):
+            follower.aim(target, ARM.tool_yaw_rad)
+            assert follower.target_m == target
+        expected += run(now, 25)
+        path += run(later, 25)
+    assert path == expected[:-1]
+    assert max(math.dist(a, b) for a, b in itertools.pairwise(path)) > 1e-4
+
+
+def test_targets_that_come_every_tick_are_gone_to_and_a_brake_waits_for_nothing():
+    follower = Follower(ARM, tick_s=FAST_DT)
+    follower.seed(Q_START)
+    for i in range(200):
+        follower.aim((START[0] + 1e-4 * i, *START[1:]), ARM.tool_yaw_rad)
+        follower.step()
+    assert KINEMATICS.tcp(follower.q_rad)[0] > START[0] + 0.01
+    follower.aim((START[0], START[1] + 0.05, START[2]), ARM.tool_yaw_rad)
+    follower.brake()
+    path = tcps(run(follower, 300))
+    assert path[-1] == pytest.approx(follower.target_m, abs=1e-5)
+    assert abs(path[-1][1] - START[1]) < 1e-4
 
 
 def test_joints_keep_their_speeds_and_accelerations_over_random_targets():

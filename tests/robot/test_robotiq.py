@@ -104,6 +104,16 @@ def test_only_a_closing_that_was_stopped_holds_an_object(bench, obj, is_moving, 
     assert bench.gripper.state.opening_m == pytest.approx(TOOL.stroke_m * (1 - 120 / 255))
 
 
+@pytest.mark.parametrize(("is_awaited", "least", "most"), [(False, 190, 260), (True, 500, 1000)])
+def test_it_is_asked_now_and_then_and_more_often_where_somebody_waits(bench, is_awaited, least, most):
+    bench.turn(lambda: bench.gripper.state is not None)
+    before = bench.gripper.n_answers
+    for _ in range(2000):
+        bench.reactor.poll()
+        bench.gripper.poll(is_awaited=is_awaited)
+    assert least <= bench.gripper.n_answers - before <= most
+
+
 def test_a_silent_gripper_and_a_closed_connection_are_errors(bench):
     bench.turn(lambda: bench.gripper.state is not None)
     with pytest.raises(WireError, match="powered"):

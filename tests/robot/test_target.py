@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 
 from config.loader import load_arm
 from robot.messages import Heading, Twist
-from robot.motion.target import TargetLimits, advance_heading, advance_twist, fence
+from robot.motion.target import Shaped, TargetLimits, advance_heading, advance_twist, fence, is_free
 
 ARM = load_arm("ur5e")
 LIMITS = TargetLimits.of(ARM, 0.0)
@@ -96,6 +96,31 @@ def test_a_twist_that_would_tilt_the_tool_says_that_it_does_not():
 @given(st.tuples(*[st.floats(-2.0, 2.0)] * 3), PLACE)
 def test_whatever_is_wanted_the_fence_keeps_the_leash(wanted, measured):
     assert math.dist(fence(wanted, measured, LIMITS).position_m, measured) <= LIMITS.leash_m * (1 + 1e-9)
+
+
+STRAY = LIMITS.leash_m / 3
+NEARBY = st.tuples(*[st.floats(-0.08, 0.08)] * 3)
+
+
+@given(PLACE, NEARBY, st.tuples(st.floats(0.0, STRAY), st.floats(0.0, math.pi), st.floats(-math.pi, math.pi)))
+def test_the_fence_leaves_a_free_target_alone_wherever_the_leash_is_held(tool, away, stray):
+    r, a, b = stray
+    held = (
+        tool[0] + r * math.sin(a) * math.cos(b),
+        tool[1] + r * math.sin(a) * math.sin(b),
+        tool[2] + r * math.cos(a),
+    )
+    target = (tool[0] + away[0], tool[1] + away[1], tool[2] + away[2])
+    if is_free(target, tool, LIMITS, stray_m=STRAY):
+        assert fence(target, held, LIMITS) == Shaped(target)
+
+
+@pytest.mark.parametrize("short_m", [-1e-6, 1e-6])
+def test_a_target_is_free_up_to_the_leash_less_the_stray_and_inside_the_workspace(short_m):
+    far = (HIGH[0] + LIMITS.leash_m - STRAY - short_m, *HIGH[1:])
+    assert is_free(far, HIGH, LIMITS, stray_m=STRAY) == (short_m > 0)
+    edge = LIMITS.workspace_m[1][2]
+    assert is_free((*HIGH[:2], edge - short_m), (*HIGH[:2], edge), LIMITS, stray_m=STRAY) == (short_m > 0)
 
 
 @given(st.tuples(*[st.floats(-2.0, 2.0)] * 3), PLACE)

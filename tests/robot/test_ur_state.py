@@ -37,7 +37,7 @@ def but(**changes):
     ],
 )
 def test_the_gravest_of_what_it_says_is_its_mode(status, mode):
-    assert mode_of(status) is mode
+    assert mode_of(status.robot_mode, status.safety_bits) is mode
 
 
 @pytest.mark.parametrize(

@@ -112,13 +112,19 @@ class Peer:
 
     def stream(self, package: bytes) -> bool:
         """Send a package that may be left out when the peer lags, and tell whether it was taken."""
+        if not self.has_room(len(package)):
+            return False
+        self._enqueue(package)
+        return True
+
+    def has_room(self, n_bytes: int) -> bool:
+        """Tell whether a package of this size would be taken; where the peer lags it counts as left out."""
         if not self._is_open or self._is_closing or self._host.is_frozen:
             return False
         limit = self._host.budget.reply_bytes if self._outbox else self._host.budget.stream_bytes
-        if self.n_unsent and self.n_unsent + len(package) > limit:
+        if self.n_unsent and self.n_unsent + n_bytes > limit:
             self.n_skipped += 1
             return False
-        self._enqueue(package)
         return True
 
     def close(self) -> None:

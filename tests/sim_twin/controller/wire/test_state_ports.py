@@ -123,6 +123,28 @@ def test_a_realtime_client_that_never_reads_disturbs_nobody(bench):
     slow.until(lambda: bench.robot.scripts)
 
 
+def test_a_realtime_package_that_nobody_takes_is_not_made_until_somebody_reads_again(bench):
+    slow = bench.client(30003, n_receive_bytes=4096)
+    slow.until(lambda: bench.port(30003).peers)
+    make, made = bench.robot.realtime_state, []
+    bench.robot.realtime_state = lambda: made.append(None) or make()
+    (peer,) = bench.port(30003).peers
+
+    def run(n_steps):
+        for step in range(n_steps):
+            bench.wires.poll()
+            bench.wires.tick(step)
+
+    run(10_000)
+    assert peer.n_skipped
+    n_made, n_skipped = len(made), peer.n_skipped
+    run(500)
+    assert (len(made), peer.n_skipped) == (n_made, n_skipped + 500)
+    slow.until(lambda: not peer.n_unsent)
+    run(5)
+    assert len(made) == n_made + 5
+
+
 @pytest.mark.parametrize("number", [30001, 30002, 30003])
 def test_thousands_of_malformed_uploads_leave_the_second_client_undisturbed(bench, number):
     rng = np.random.default_rng(number)
