@@ -46,8 +46,15 @@ def learning_results(runs: Sequence[Run]) -> list[BenchResult]:
             "trials",
             at_most=TRIALS_GOAL,
         ),
+        _row(
+            "trials_over_optimum_worst_goal",
+            [era.trials_over_optimum_worst for era in (*firsts, *laters)],
+            "trials",
+            at_most=TRIALS_GOAL,
+        ),
         _row("least_success_at_end", [_success(era) for era in (*firsts, *laters)], "share", at_least=SUCCESS_GOAL),
         _row("time_steps_to_all", [run.summary.time_steps_to_all for run in runs], "decisions"),
+        _row("graph_right_at_first_epochs", [era.graph_right_after for era in firsts], "epochs"),
         _row("graph_right_after_epochs", [era.graph_right_after for era in laters], "epochs", at_most=GRAPH_GOAL),
     ]
 

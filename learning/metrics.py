@@ -143,6 +143,8 @@ class EraSummary(msgspec.Struct, frozen=True, kw_only=True):
     """First look, every ten epochs, at which the learnt graph is right for every goal in every reachable state."""
     graph_wrong_later: float | None
     """Share of the looks after that one at which it was wrong again; None without such looks."""
+    graph_wrong_last: tuple[int, int] | None
+    """Predictions that were wrong at the era's last look, and how many were compared; None where none was taken."""
     success_by_goal: tuple[float | None, ...]
     """Share of successes over the era's last 200 epochs' evaluations."""
     trials_by_goal: tuple[float | None, ...]
@@ -150,6 +152,8 @@ class EraSummary(msgspec.Struct, frozen=True, kw_only=True):
     optimal_by_goal: tuple[int | None, ...]
     trials_over_optimum: float | None
     """Mean over goals of the trials beyond the optimum; an epoch failed or cut short counts as all its trials."""
+    trials_over_optimum_worst: float | None
+    """The same of the goal that has the most."""
     trials_over_optimum_of_successes: float | None
     """The same of those that succeeded alone."""
 
@@ -241,11 +245,13 @@ def _summarise_era(
         learnt_after=_since(era, first_running(mastered, running=2)),
         graph_right_after=_since(era, right_at),
         graph_wrong_later=fmean(later) if later else None,
+        graph_wrong_last=(graph_rows[-1].n_wrong, graph_rows[-1].n_cases) if graph_rows else None,
         success_by_goal=tuple(_ratio(_total(of_goal, "n_successes"), _total(of_goal, "n_all")) for of_goal in settled),
         trials_by_goal=trials,
         optimal_by_goal=tuple(optima),
-        trials_over_optimum=_mean_excess(trials_all, optima),
-        trials_over_optimum_of_successes=_mean_excess(trials, optima),
+        trials_over_optimum=_mean(_excess(trials_all, optima)),
+        trials_over_optimum_worst=max(_excess(trials_all, optima), default=None),
+        trials_over_optimum_of_successes=_mean(_excess(trials, optima)),
     )
 
 
@@ -261,9 +267,12 @@ def _since(era: Era, epoch: int | None) -> int | None:
     return None if epoch is None else epoch - era.from_epoch
 
 
-def _mean_excess(trials: Sequence[float | None], optima: Sequence[int | None]) -> float | None:
-    """Mean of trials beyond the optimum over the goals that can be achieved; None if any was never achieved."""
-    excess = [(n, best) for n, best in zip(trials, optima, strict=True) if best is not None]
-    if not excess or any(n is None for n, _ in excess):
-        return None
-    return fmean(n - best for n, best in excess if n is not None)
+def _excess(trials: Sequence[float | None], optima: Sequence[int | None]) -> list[float]:
+    """Return trials beyond the optimum, of each goal that can be achieved; none at all if any never was."""
+    excess = [None if n is None else n - best for n, best in zip(trials, optima, strict=True) if best is not None]
+    known = [value for value in excess if value is not None]
+    return known if len(known) == len(excess) else []
+
+
+def _mean(values: Sequence[float]) -> float | None:
+    return fmean(values) if values else None

@@ -73,6 +73,9 @@ class EraReport(msgspec.Struct, frozen=True, kw_only=True):
     graph_wrong_later: Spread | None
     """Share of the looks after that at which it was wrong again."""
     trials_over_optimum: Spread | None
+    """Mean over goals."""
+    trials_over_optimum_worst: Spread | None
+    """Of the goal that has the most."""
     trials_over_optimum_of_successes: Spread | None
     success: Spread | None
     """Of the least successful goal over an era's last 200 epochs."""
@@ -166,6 +169,7 @@ def _report_era(parts: Sequence[EraSummary]) -> EraReport:
         graph_right_after=_spread(parts, lambda part: part.graph_right_after),
         graph_wrong_later=_spread(parts, lambda part: part.graph_wrong_later),
         trials_over_optimum=_spread(parts, lambda part: part.trials_over_optimum),
+        trials_over_optimum_worst=_spread(parts, lambda part: part.trials_over_optimum_worst),
         trials_over_optimum_of_successes=_spread(parts, lambda part: part.trials_over_optimum_of_successes),
         success=_spread(parts, lambda part: min((s for s in part.success_by_goal if s is not None), default=None)),
     )

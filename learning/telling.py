@@ -29,13 +29,19 @@ def summary_lines(run: Run) -> Iterator[str]:
 def _era_line(era: EraSummary, *, is_first: bool) -> str:
     word = "learnt" if is_first else f"rules changed at epoch {era.from_epoch}: recovered"
     after = "not yet" if era.learnt_after is None else f"after {era.learnt_after} epochs"
-    graph = "" if era.graph_right_after is None else f", graph right after {era.graph_right_after}"
+    graph = ""
+    if era.graph_right_after is not None:
+        graph = f", graph right after {era.graph_right_after}"
+    elif era.graph_wrong_last is not None:
+        n_wrong, n_cases = era.graph_wrong_last
+        graph = f", graph never right ({n_wrong} of {n_cases} predictions wrong at last)"
     if era.graph_wrong_later:
         graph += f" (wrong again at {era.graph_wrong_later:.0%} of later looks)"
     shares = [share for share in era.success_by_goal if share is not None]
     success = f", least success at the end {min(shares):.0%}" if shares else ""
     excess = era.trials_over_optimum
-    trials = "" if excess is None else f", {excess:.2f} trials over the optimum"
+    worst = era.trials_over_optimum_worst
+    trials = "" if excess is None else f", {excess:.2f} trials over the optimum (goal with most: {worst:.2f})"
     return f"{word} {after}{graph}{success}{trials}"
 
 
@@ -43,7 +49,8 @@ def report_table(report: Report) -> Table:
     """Return a table of all groups and sets of rules: how many learnt over its 95 % interval, median over range."""
     table = Table(show_lines=True)
     for heading in (
-        "learner", "rules from", "learnt", "after epochs", "graph right after", "trials over optimum", "success"
+        "learner", "rules from", "learnt", "after epochs", "graph right after", "trials over optimum",
+        "goal with most", "success",
     ):  # fmt: skip
         table.add_column(heading, overflow="fold")
     for group in report.groups:
@@ -55,6 +62,7 @@ def report_table(report: Report) -> Table:
                 _spread(era.learnt_after, "{:.0f}"),
                 _spread(era.graph_right_after, "{:.0f}"),
                 _spread(era.trials_over_optimum, "{:.2f}"),
+                _spread(era.trials_over_optimum_worst, "{:.2f}"),
                 _spread(era.success, "{:.0%}"),
             )
     return table
@@ -138,4 +146,4 @@ def _spread(spread: Spread | None, form: str) -> str:
     middle = form.format(spread.median)
     if spread.of == 1:
         return middle
-    return f"{middle}\n{form.format(spread.least)} to {form.format(spread.greatest)}"
+    return f"{middle}\n{form.format(spread.least)}–{form.format(spread.greatest)}"

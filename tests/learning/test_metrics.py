@@ -108,6 +108,12 @@ def test_mastered_is_eighteen_of_twenty(hits, tests, mastered):
     assert is_mastered(row(10, hits=hits, tests=tests)) is mastered
 
 
+def test_an_epoch_cut_short_counts_against_mastery():
+    three_void = msgspec.structs.replace(row(10, hits=18, tests=18), n_void=3)
+    assert not is_mastered(three_void)
+    assert is_mastered(msgspec.structs.replace(three_void, n_void=2))
+
+
 def test_learnt_is_the_first_of_two_evaluations_running():
     marks = [(10, True), (20, False), (30, True), (40, True), (50, True)]
     assert first_running(marks, running=2) == 30
@@ -144,6 +150,8 @@ def test_a_summary_worked_by_hand():
     assert second.trials_over_optimum_of_successes == pytest.approx((0.0 + 0.5) / 2)
     # Goal 0: 38 tests of one trial, two failures of eight.
     assert second.trials_over_optimum == pytest.approx(((38 + 16) / 40 - 1 + 0.5) / 2)
+    assert second.trials_over_optimum_worst == pytest.approx(0.5)
+    assert (first.graph_wrong_last, second.graph_wrong_last) == ((0, 8), (0, 8))
 
 
 def test_an_epoch_cut_short_counts_as_one_that_failed():

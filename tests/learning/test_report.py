@@ -119,7 +119,9 @@ def test_words_say_what_was_reached_and_what_was_not(runs):
     assert "120 epochs" in lines[0]
     assert "learnt after" in lines[1]
     assert "rules changed at epoch 60: recovered not yet, graph right after 20" in lines[2]
-    assert "0.12 trials over the optimum" in lines[2]
+    assert "0.12 trials over the optimum (goal with most: " in lines[2]
+    wrong = with_era(runs[0], 0, graph_right_after=None, graph_wrong_last=(24, 1008))
+    assert "graph never right (24 of 1008 predictions wrong at last)" in list(summary_lines(wrong))[1]
     assert report_table(report_of(group_runs(runs))).row_count == 4
 
 
