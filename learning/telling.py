@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 
+from rich import box
 from rich.table import Table
 from rich.text import Text
 
@@ -47,10 +48,13 @@ def _era_line(era: EraSummary, *, is_first: bool) -> str:
 
 def report_table(report: Report) -> Table:
     """Return a table of all groups and sets of rules: how many learnt over its 95 % interval, median over range."""
-    table = Table(show_lines=True)
+    table = Table(
+        box=box.SIMPLE_HEAD,
+        pad_edge=False,
+        caption="trials over the optimum: mean over goals, and of the goal with most",
+    )
     for heading in (
-        "learner", "rules from", "learnt", "after epochs", "graph right after", "trials over optimum",
-        "goal with most", "success",
+        "learner", "rules\nfrom", "learnt", "after\nepochs", "graph\nright", "over\noptimum", "worst\ngoal", "success"
     ):  # fmt: skip
         table.add_column(heading, overflow="fold")
     for group in report.groups:
@@ -64,6 +68,7 @@ def report_table(report: Report) -> Table:
                 _spread(era.trials_over_optimum, "{:.2f}"),
                 _spread(era.trials_over_optimum_worst, "{:.2f}"),
                 _spread(era.success, "{:.0%}"),
+                end_section=True,
             )
     return table
 
@@ -146,4 +151,4 @@ def _spread(spread: Spread | None, form: str) -> str:
     middle = form.format(spread.median)
     if spread.of == 1:
         return middle
-    return f"{middle}\n{form.format(spread.least)}–{form.format(spread.greatest)}"
+    return f"{middle}\n{form.format(spread.least).removesuffix('%')}–{form.format(spread.greatest)}"
