@@ -16,8 +16,8 @@ from learning.ended import Ended
 from learning.errors import LearningError, RunFolderError
 from learning.figures import curriculum_figure, performance_figure, save
 from learning.progress import Progress, Status
-from learning.report import Run, group_runs, load_run, report_of
-from learning.run_folder import RunFolder, run_folders
+from learning.report import Run, group_runs, load_run, load_runs, report_of
+from learning.run_folder import RunFolder
 from learning.stop_request import StopRequest
 from learning.stopwatch import Stopwatch
 from learning.telling import explanation_table, profile_table, report_table, score_table, summary_lines
@@ -164,12 +164,27 @@ def report(
     *,
     json: Annotated[bool, typer.Option("--json", help="Print the figures of merit as one JSON object.")] = False,
 ) -> None:
-    """Draw both panels of the paper's Figure 2 and the curriculum; runs of one learner become median and range."""
-    loaded = [load_run(folder) for path in runs for folder in run_folders(path)]
-    single = loaded[0].folder if len(loaded) == 1 else None
-    folder = out or (Path("report") if single is None else RunFolder(Path(single)).figures)
-    paths = _write_figures(loaded, folder)
-    groups = group_runs(loaded)
+    """Draw both panels of the paper's Figure 2 and the curriculum; runs of one learner become median and range.
+
+    Runs inside a folder that cannot be read are named and left out (exit code 1).
+    """
+    loaded, damaged = load_runs(runs)
+    for reason in damaged:
+        typer.echo(f"error: left out: {reason}", err=True)
+    if loaded:
+        _report(loaded, out or _report_folder(loaded, is_whole=not damaged), json=json)
+    if damaged:
+        raise typer.Exit(EXIT_FAILED)
+
+
+def _report_folder(runs: list[Run], *, is_whole: bool) -> Path:
+    """Return where a report goes that was given no place: into the run where one run was asked for."""
+    return RunFolder(Path(runs[0].folder)).figures if is_whole and len(runs) == 1 else Path("report")
+
+
+def _report(runs: list[Run], folder: Path, *, json: bool) -> None:
+    paths = _write_figures(runs, folder)
+    groups = group_runs(runs)
     if json:
         typer.echo(msgspec.json.encode(report_of(groups)).decode())
         return

@@ -7,7 +7,8 @@ process lends a hand when too much is waiting, and redoes what a dead worker lef
 import signal
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
-from multiprocessing import connection, get_context
+from contextlib import contextmanager
+from multiprocessing import connection, get_context, resource_tracker
 from multiprocessing.process import BaseProcess
 from types import TracebackType
 from typing import Self
@@ -27,6 +28,9 @@ MakeLearner = Callable[[], Learner]
 
 Graph = tuple[tuple[int, int], ...] | None
 """For each goal: goal-states compared and how many of them predicted wrongly."""
+
+STOP_SIGNALS = (signal.SIGINT, signal.SIGTERM)
+"""What reaches every process of the group; the learning process alone decides what it means."""
 
 PATIENCE_S = 5.0
 """How long a worker whose pipe has closed may take to exit by itself."""
@@ -82,7 +86,7 @@ class _Worker:
 
     def stop(self) -> None:
         self.pipe.close()
-        self.process.terminate()  # nothing of a worker's is kept
+        self.process.kill()  # it is deaf to SIGTERM, and nothing of a worker's is kept
         self.process.join()
 
 
@@ -110,9 +114,11 @@ class EvaluationPool:
         self._tester = tester
         self._station = station
         self._tester_holds: _Evaluation | None = None
-        self._workers = [_Worker(make_learner) for _ in range(n_workers) if make_learner]
+        self._workers: list[_Worker] = []
         self._report = report
         self._evaluations: deque[_Evaluation] = deque()
+        if make_learner is not None:
+            self._start(make_learner, n_workers)
 
     @property
     def n_outstanding(self) -> int:
@@ -155,6 +161,15 @@ class EvaluationPool:
         self.close()
 
     # -------------------------------------------------------------------------------------------------------- inside
+
+    def _start(self, make_learner: MakeLearner, n_workers: int) -> None:
+        """Start the workers, all or, where a signal ends this process meanwhile, none."""
+        try:
+            with _stop_signals_held_back():
+                self._workers.extend(_Worker(make_learner) for _ in range(n_workers))
+        except BaseException:
+            self.close()
+            raise
 
     def _get_on(self) -> None:
         """Do one test here, or, where all are handed out, wait for a worker."""
@@ -216,9 +231,25 @@ class EvaluationPool:
         self._report(f"an evaluation worker died (exit code {worker.process.exitcode}); its work is redone")
 
 
+@contextmanager
+def _stop_signals_held_back() -> Iterator[None]:
+    """Let stop signals wait, here and in processes started meanwhile: those take seconds until they can ignore them.
+
+    The resource tracker of multiprocessing is started first, as starting it unblocks these signals.
+    """
+    resource_tracker.ensure_running()
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, STOP_SIGNALS)
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
 def _serve(pipe: connection.Connection, make_learner: MakeLearner) -> None:
     """Run a worker: test what comes through the pipe until the other end closes."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the whole group; the learning process decides
+    for number in STOP_SIGNALS:
+        signal.signal(number, signal.SIG_IGN)
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, STOP_SIGNALS)
     learner = make_learner()
     try:
         pipe.send_bytes(b"ready")

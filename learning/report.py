@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable, Sequence
+from pathlib import Path
 from statistics import median
 
 import msgspec
@@ -9,7 +10,7 @@ import msgspec
 from learning.errors import RunFolderError
 from learning.metrics import EraSummary, Summary, summarise
 from learning.rows import EvaluationRow, GoalRow
-from learning.run_folder import Manifest, RunFolder
+from learning.run_folder import Manifest, RunFolder, run_folders
 
 __all__ = [
     "Count",
@@ -21,6 +22,7 @@ __all__ = [
     "Spread",
     "group_runs",
     "load_run",
+    "load_runs",
     "report_of",
 ]
 
@@ -101,10 +103,15 @@ def load_run(folder: RunFolder) -> Run:
     """Return a run, finished or not.
 
     Raises:
-        RunFolderError: the folder or one of its tables cannot be read.
+        RunFolderError: the folder or one of its tables cannot be read, or a table tells of what the run has not.
     """
     manifest = folder.manifest()
     goal_rows, evaluation_rows = folder.goals(), folder.evaluations()
+    _refuse_strange(folder.path / "goals.csv", goal_rows, len(manifest.goals))
+    _refuse_strange(folder.path / "evaluations.csv", evaluation_rows, len(manifest.goals))
+    for i, row in enumerate(goal_rows):
+        if row.epoch != i:
+            raise RunFolderError(f"{folder.path / 'goals.csv'}: line {i + 2}: expected epoch {i}, got {row.epoch}")
     summary = summarise(
         goal_rows,
         evaluation_rows,
@@ -121,6 +128,37 @@ def load_run(folder: RunFolder) -> Run:
         evaluation_rows=tuple(evaluation_rows),
         summary=summary,
     )
+
+
+def _refuse_strange(path: Path, rows: Sequence[GoalRow | EvaluationRow], n_goals: int) -> None:
+    """Refuse a table that tells of a goal that there is not."""
+    for i, row in enumerate(rows, 2):
+        if not 0 <= row.goal < n_goals:
+            raise RunFolderError(f"{path}: line {i}: expected a goal from 0 to {n_goals - 1}, got {row.goal}")
+
+
+def load_runs(paths: Sequence[Path]) -> tuple[list[Run], list[str]]:
+    """Return the runs that paths name, run folders and folders of them, in order.
+
+    Inside a folder of runs those that cannot be read are left out.
+
+    Returns:
+        The runs, and of each that was left out what is wrong with it, in a line.
+
+    Raises:
+        RunFolderError: a path names no run, or is itself the folder of a run that cannot be read.
+    """
+    runs: list[Run] = []
+    damaged: list[str] = []
+    for path in paths:
+        for folder in run_folders(path):
+            try:
+                runs.append(load_run(folder))
+            except RunFolderError as error:
+                if folder.path == path:
+                    raise
+                damaged.append(str(error))
+    return runs, damaged
 
 
 def group_runs(runs: Sequence[Run]) -> list[Group]:

@@ -4,9 +4,10 @@ import fcntl
 import hashlib
 from pathlib import Path
 from types import TracebackType
-from typing import IO, Self
+from typing import IO, Annotated, Self
 
 import msgspec
+from msgspec import Meta
 
 from config.loader import load_resolved
 from config.resolved import Resolved
@@ -22,13 +23,15 @@ CONFIG_NAME = "config.yaml"
 MANIFEST_NAME = "run.json"
 PROFILE_NAME = "profile.json"
 
+Share = Annotated[float, Meta(ge=0.0, le=1.0)]
+
 
 class GoalInfo(msgspec.Struct, frozen=True, kw_only=True):
     """A goal as figures and tables show it."""
 
     name: str
     kind: str
-    colour: tuple[float, float, float]
+    colour: tuple[Share, Share, Share]
     """Of the goal's object."""
 
 
@@ -93,13 +96,14 @@ class RunFolder:
         """
         path = self.path / MANIFEST_NAME
         try:
-            manifest = msgspec.json.decode(path.read_bytes(), type=Manifest)
+            raw = path.read_bytes()
         except OSError as error:
             message = f"{self.path}: expected a run folder, found no run.json in it ({error.strerror})"
             raise RunFolderError(message) from error
+        try:
+            manifest = msgspec.json.decode(raw, type=Manifest)
         except (msgspec.DecodeError, UnicodeDecodeError) as error:
-            message = f"{path}: {error}"
-            raise RunFolderError(message) from error
+            raise RunFolderError(_damage(path, raw, error)) from error
         if manifest.format != FORMAT:
             raise RunFolderError(f"{path}: expected format {FORMAT}, got {manifest.format}")
         return manifest
@@ -219,6 +223,16 @@ def run_folders(path: Path) -> list[RunFolder]:
     if not found:
         raise RunFolderError(f"{path}: expected a run folder or a folder of run folders, found no run.json")
     return found
+
+
+def _damage(path: Path, raw: bytes, error: Exception) -> str:
+    """Return what is wrong with a manifest, and what to try."""
+    is_cut = "truncated" in str(error)
+    got = f"{len(raw)} bytes that {'break off' if is_cut else 'are not that'} ({error})"
+    return (
+        f"{path}: expected the JSON object that a run begins with, got {got}: bring the file back from a copy, or leave"
+        " this run out; its tables are beside it and can be read without"
+    )
 
 
 def _is_left_over(entry: Path) -> bool:

@@ -1,6 +1,7 @@
 """Benches of the twin: how fast it is, and whether its grasp holds."""
 
 import math
+from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
 from time import perf_counter, sleep
@@ -16,8 +17,7 @@ from robot.local_station import LocalStation
 from robot.messages import Heading
 from robot.operated import OperatedStation
 from robot.rigs import build_operator, build_station
-from sim_twin.names import on_table
-from sim_twin.pilot import Pilot
+from sim_twin.picks import Pick, pick_all, pick_off_centre
 from sim_twin.plant import TwinPlant, TwinWorld
 
 __all__ = ["bench_grasp", "bench_twin", "open_twin"]
@@ -26,8 +26,6 @@ STACK_GOAL_US = 300.0
 SCALING_GOAL = 1.9
 HOLD_GOAL = 0.98
 SLIP_GOAL_MM = 1.0
-FIRST_SEED = 200
-"""Tables of seeds below this were looked at while contacts were chosen: none of them is reported."""
 
 
 def open_twin(resolved: Resolved) -> tuple[LocalStation, TwinPlant]:
@@ -160,28 +158,18 @@ def bench_twin(*, full: bool) -> BenchReport:
 # ---------------------------------------------------------------------------------------------------------- grasp
 
 
-class _Pick(msgspec.Struct, frozen=True):
-    """One pick: was it ever held, was it held to the end, how far did it slip, and was a drop seen."""
-
-    was_held: bool
-    is_held: bool
-    slip_m: float
-    is_reported_held: bool
-
-
 def bench_grasp(*, full: bool) -> BenchReport:
-    """Pick from inside the boxes, carry at top speed, stop hard; then the same with a fifth of the friction."""
+    """Pick from inside the boxes, carry at top speed, stop hard; then with a fifth of the friction, then off centre."""
     begin = perf_counter()
     resolved = resolve()
     n = 200 if full else 60
-    firm = _pick_all(resolved, n)
-    slippery = _pick_all(_with_friction(resolved, 0.2), n // 2)
-    held = [p for p in firm if p.is_held]
-    hold_rate = len(held) / len(firm)
-    slip_mm = 1e3 * float(np.percentile([p.slip_m for p in held], 95)) if held else math.inf
+    firm = _picks(resolved, n, pick_all)
+    slippery = _picks(_with_friction(resolved, 0.2), n // 2, pick_all)
+    hold_rate = _share([p.is_held for p in firm])
+    slip_mm = _slip_mm(firm)
     dropped = [p for p in (*firm, *slippery) if p.was_held and not p.is_held]
-    seen = sum(not p.is_reported_held for p in dropped) / len(dropped) if dropped else 1.0
-    drop_rate = sum(p.was_held and not p.is_held for p in slippery) / len(slippery)
+    seen = _share([not p.is_reported_held for p in dropped]) if dropped else 1.0
+    drop_rate = _share([p.was_held and not p.is_held for p in slippery])
     results = (
         BenchResult(
             name="hold_rate", value=hold_rate, unit="share", goal=f">= {HOLD_GOAL:g}", ok=hold_rate >= HOLD_GOAL
@@ -192,8 +180,36 @@ def bench_grasp(*, full: bool) -> BenchReport:
         BenchResult(name="drop_seen_rate", value=seen, unit="share", goal="= 1", ok=seen == 1.0),
         BenchResult(name="drop_rate_low_friction", value=drop_rate, unit="share", goal="= 1", ok=drop_rate == 1.0),
         BenchResult(name="picks", value=float(len(firm)), unit="1"),
+        *_off_centre_results(_picks(resolved, n, pick_off_centre)),
     )
     return bench_report("grasp", results, seconds=perf_counter() - begin)
+
+
+def _off_centre_results(picks: Sequence[Pick]) -> list[BenchResult]:
+    """Return what became of descents beside an object's centre: was it taken, and what of those that were."""
+    taken = [p for p in picks if p.was_held]
+    return [
+        BenchResult(name="offset_taken_rate", value=_share([p.was_held for p in picks]), unit="share"),
+        BenchResult(name="offset_hold_rate", value=_share([p.is_held for p in taken]), unit="share"),
+        BenchResult(name="offset_slip_mm_p95", value=_slip_mm(taken), unit="mm"),
+        BenchResult(name="offset_picks", value=float(len(picks)), unit="1"),
+    ]
+
+
+def _picks(resolved: Resolved, n: int, way: Callable[[LocalStation, TwinPlant, int], list[Pick]]) -> list[Pick]:
+    station, plant = open_twin(resolved)
+    return way(station, plant, n)
+
+
+def _share(of: Sequence[bool]) -> float:
+    """Return the share that holds, not a number where there is nothing to count."""
+    return sum(of) / len(of) if of else math.nan
+
+
+def _slip_mm(picks: Sequence[Pick]) -> float:
+    """Return the 95th percentile of how far what was held to the end slipped, infinite where nothing was."""
+    slips_m = [p.slip_m for p in picks if p.is_held]
+    return 1e3 * float(np.percentile(slips_m, 95)) if slips_m else math.inf
 
 
 def _with_friction(resolved: Resolved, share: float) -> Resolved:
@@ -201,48 +217,3 @@ def _with_friction(resolved: Resolved, share: float) -> Resolved:
     scenario = resolved.scenario
     cylinders = tuple(msgspec.structs.replace(c, friction=c.friction * share) for c in scenario.cylinders)
     return msgspec.structs.replace(resolved, scenario=msgspec.structs.replace(scenario, cylinders=cylinders))
-
-
-def _pick_all(resolved: Resolved, n: int) -> list[_Pick]:
-    """Pick every boxed cylinder in turn, each at a newly drawn place and turn, with its lid open."""
-    last_epoch = resolved.scenario.schedule[-1].from_epoch
-    station, plant = open_twin(resolved)
-    pilot = Pilot(station)
-    names = [c.name for c in resolved.scenario.cylinders if c.inside is not None]
-    picks = []
-    for k in range(n):
-        pilot.reset(seed=FIRST_SEED + k, epoch=last_epoch)
-        picks.append(_pick(pilot, plant, names[k % len(names)], side=1 if k % 4 < 2 else -1))
-    return picks
-
-
-def _pick(pilot: Pilot, plant: TwinPlant, name: str, *, side: int) -> _Pick:
-    """Pick one, lift it, carry it across the table at top speed and stop while moving."""
-    x, y, _ = pilot.where(name)
-    pilot.go(x, y)
-    pilot.rest()
-    was_held = pilot.down(lambda r: r.percept.grip.has_object)
-    pilot.rest(4)
-    start = _in_hand(plant, name)
-    for _ in range(14):
-        pilot.step()
-    heading = math.atan2(-y, 0.42 - x) if side > 0 else math.atan2(-y, 0.36 - x)
-    for _ in range(12):
-        pilot.step(heading_rad=heading, distance_m=0.022)
-    plant.arm.stop()
-    for _ in range(60):
-        plant.arm.clock.wait_tick()
-    end = _in_hand(plant, name)
-    is_held = bool(np.linalg.norm(end) < HELD_WITHIN_M)
-    return _Pick(was_held, is_held, float(np.linalg.norm(end - start)), plant.arm.read().grip.has_object)
-
-
-HELD_WITHIN_M = 0.03
-
-
-def _in_hand(plant: TwinPlant, name: str) -> np.ndarray:
-    """Return an object's position in the tool's frame, from the physics.  (3,)"""
-    data = plant.world.data
-    mujoco.mj_kinematics(plant.world.model, data)
-    tcp = data.site("tcp")
-    return tcp.xmat.reshape(3, 3).T @ (data.body(on_table(name)).xpos - tcp.xpos)

@@ -1,5 +1,6 @@
 """`autotelic twin`: look at the simulated table."""
 
+import math
 import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -33,19 +34,29 @@ def picture(
     outputs: Annotated[
         str, typer.Option("--outputs", help="Digital outputs that are on, by number: lamps and lids, e.g. 1,3,5.")
     ] = "",
+    look_from: Annotated[
+        str,
+        typer.Option(
+            "--from",
+            metavar="BEARING,ELEVATION,DISTANCE",
+            help="Where to look from: degrees round from the arm's front to its left, degrees up, metres.",
+        ),
+    ] = "",
 ) -> None:
     """Draw one table to a PNG file (needs EGL or OSMesa)."""
     _check_out(out, ".png")
     os.environ.setdefault("MUJOCO_GL", "egl")
     from matplotlib.image import imsave
 
-    from sim_twin.render import NoGLError, open_renderer, render
+    from sim_twin.render import NoGLError, Viewpoint, open_renderer, render
 
+    place = _place(look_from)
+    viewpoint = Viewpoint(bearing_deg=place[0], elevation_deg=place[1], distance_m=place[2]) if place else None
     plant = _make_plant(scenario, rig)
     plant.resetter.reset(seed=seed, epoch=0, digital_out=_bits(outputs))
     try:
         with open_renderer(plant.world) as renderer:
-            imsave(out, render(plant.world, renderer))
+            imsave(out, render(plant.world, renderer, viewpoint=viewpoint))
     except NoGLError as error:
         typer.echo(str(error), err=True)
         raise typer.Exit(1) from None
@@ -97,6 +108,23 @@ def _bits(outputs: str) -> int:
     if not all(0 <= n < N_OUTPUTS for n in numbers):
         raise typer.BadParameter(f"expected numbers 0..{N_OUTPUTS - 1} with commas, got {outputs!r}")
     return sum(1 << n for n in set(numbers))
+
+
+def _place(look_from: str) -> tuple[float, float, float] | None:
+    """Return bearing and elevation in degrees and distance in metres; None where nothing is asked."""
+    if not look_from:
+        return None
+    try:
+        bearing_deg, elevation_deg, distance_m = (float(part) for part in look_from.split(","))
+    except ValueError:
+        bearing_deg = elevation_deg = distance_m = math.nan
+    if not (math.isfinite(bearing_deg) and 0.0 <= elevation_deg <= 90.0 and 0.5 <= distance_m <= 5.0):
+        raise typer.BadParameter(
+            f"expected a bearing, an elevation of 0 to 90 degrees and a distance of 0.5 to 5 m, with commas, got "
+            f"{look_from!r}",
+            param_hint="--from",
+        )
+    return bearing_deg, elevation_deg, distance_m
 
 
 def _check_out(path: Path, suffix: str) -> None:

@@ -1,9 +1,11 @@
 """Pictures of the twin: off-screen rendering with lit lamps, where a GL can be had."""
 
+import math
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 
+import msgspec
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
@@ -11,11 +13,33 @@ from numpy.typing import NDArray
 from sim_twin.names import on_table
 from sim_twin.plant import TwinWorld
 
-__all__ = ["NoGLError", "Picture", "open_renderer", "render"]
+__all__ = ["NoGLError", "Picture", "Viewpoint", "open_renderer", "render"]
 
 Picture = NDArray[np.uint8]
 BACKENDS = ("egl", "osmesa")
 GLOW = 0.55
+LOOKED_AT_M = (0.30, 0.0, 0.22)
+"""What a viewpoint has in the middle of its picture, base frame: between the arm and the things on the table."""
+
+
+class Viewpoint(msgspec.Struct, frozen=True, kw_only=True):
+    """Where a picture is taken from, as seen from the middle of what it shows."""
+
+    bearing_deg: float
+    """Direction of the camera in the plane, base frame: 0 in front of the arm, 90 on its left."""
+    elevation_deg: float
+    """How far above the horizon the camera is."""
+    distance_m: float
+
+    def camera(self) -> mujoco.MjvCamera:
+        """Return it as MuJoCo has it, which tells where a camera looks to and not where it is."""
+        camera = mujoco.MjvCamera()
+        camera.type = mujoco.mjtCamera.mjCAMERA_FREE
+        camera.lookat[:] = LOOKED_AT_M
+        camera.azimuth = math.remainder(self.bearing_deg + 180.0, 360.0)
+        camera.elevation = -self.elevation_deg
+        camera.distance = self.distance_m
+        return camera
 
 
 class NoGLError(RuntimeError):
@@ -43,13 +67,19 @@ def open_renderer(world: TwinWorld, *, width: int = 1280, height: int = 960) -> 
         renderer.close()
 
 
-def render(world: TwinWorld, renderer: mujoco.Renderer, *, camera: str = "overview") -> Picture:
-    """Draw the world as it stands, lamps lit as the outputs say.  -> (height, width, 3) uint8"""
+def render(world: TwinWorld, renderer: mujoco.Renderer, *, viewpoint: Viewpoint | None = None) -> Picture:
+    """Draw the world as it stands, lamps lit as the outputs say.  -> (height, width, 3) uint8
+
+    Args:
+        world: what to draw.
+        renderer: what to draw with.
+        viewpoint: where to look from; None takes the scene's own overview.
+    """
     light_lamps(world)
     option = mujoco.MjvOption()
     option.sitegroup[:] = 0
     option.geomgroup[:] = (1, 1, 1, 0, 0, 0)
-    renderer.update_scene(world.data, camera, option)
+    renderer.update_scene(world.data, "overview" if viewpoint is None else viewpoint.camera(), option)
     return renderer.render()
 
 

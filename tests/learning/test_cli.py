@@ -190,6 +190,44 @@ def test_report_compares_runs_and_writes_where_it_is_told(folder, tmp_path):
     assert (tmp_path / "sweep" / "a" / "figures" / "figure2.pdf").is_file()
 
 
+def test_a_damaged_run_in_a_folder_of_runs_is_named_and_left_out_of_the_report(tmp_path):
+    for name, seed in (("a", 5), ("b", 6), ("c", 7)):
+        make_toy_folder(tmp_path / "sweep" / name, seed=seed)
+    manifest = tmp_path / "sweep" / "b" / "run.json"
+    manifest.write_bytes(manifest.read_bytes()[:200])
+    done = autotelic("report", tmp_path / "sweep", "--out", tmp_path / "out", "--json")
+    assert done.exit_code == 1
+    assert [group["seeds"] for group in json.loads(done.stdout)["groups"]] == [[5, 7]]
+    assert (tmp_path / "out" / "figure2.png").is_file()
+    assert len(lines(done)) == 1
+    assert lines(done)[0].startswith(f"error: left out: {manifest}: expected the JSON object that a run begins with")
+    assert "got 200 bytes that break off" in lines(done)[0]
+    assert "bring the file back from a copy" in lines(done)[0]
+
+
+def test_a_folder_of_damaged_runs_only_is_reported_run_by_run_and_draws_nothing(tmp_path):
+    for name in ("a", "b"):
+        make_toy_folder(tmp_path / "sweep" / name)
+        (tmp_path / "sweep" / name / "goals.csv").write_text("epoch\n")
+    done = autotelic("report", tmp_path / "sweep", "--out", tmp_path / "out")
+    assert (done.exit_code, done.stdout) == (1, "")
+    assert [line.split(": expected")[0] for line in lines(done)] == [
+        f"error: left out: {tmp_path / 'sweep' / name / 'goals.csv'}" for name in ("a", "b")
+    ]
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_damaged_run_that_was_named_itself_is_an_error(tmp_path):
+    for name in ("a", "b"):
+        make_toy_folder(tmp_path / name)
+    (tmp_path / "b" / "run.json").write_text('{"format": 1}')
+    done = autotelic("report", tmp_path / "a", tmp_path / "b", "--out", tmp_path / "out")
+    assert done.exit_code == 2
+    assert lines(done)[0].startswith(f"error: {tmp_path / 'b' / 'run.json'}: expected the JSON object")
+    assert "13 bytes that are not that (Object missing required field `seed`)" in lines(done)[0]
+    assert not (tmp_path / "out").exists()
+
+
 def test_the_bench_reads_the_run_given_or_the_newest(folder, tmp_path):
     make_toy_folder(tmp_path / "run", seed=5)
     done = autotelic("bench", "learning", tmp_path / "run", "--json")

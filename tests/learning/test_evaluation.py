@@ -53,15 +53,19 @@ def make_test(goal, *, epoch=25, rules_epoch=24, n_tests=6):
 TESTS = [make_test(goal) for goal in range(N_GOALS)]
 
 
-def pool_of(*, station=None, make_learner=None, n_workers=0, report=lambda line: None):
+def open_pool(*, station=None, make_learner=None, n_workers=0, report=lambda line: None):
     tester = make_toy_learner(0, PROTOCOL)
-    pool = EvaluationPool(
+    return EvaluationPool(
         tester=tester.agent,
         station=station or tester.station,
         make_learner=make_learner or toy_maker(0, PROTOCOL),
         n_workers=n_workers,
         report=report,
     )
+
+
+def pool_of(**given):
+    pool = open_pool(**given)
     pool.wait_until_ready()
     return pool
 
@@ -146,6 +150,30 @@ def test_a_worker_that_cannot_start_is_reported(learner):
         pool.submit(TESTS, encode({"agent": learner.agent.state_dict()}), None)
         assert list(pool.collect(at_most=0)) == [expected(learner)]
     assert said == ["an evaluation worker died (exit code 7); its work is redone"]
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_stop_signal_to_the_group_harms_no_worker_from_its_first_instant_on(learner, number, capfd):
+    said = []
+    with open_pool(station=NoStation(), n_workers=1, report=said.append) as pool:
+        worker = pool._workers[0]
+        while not worker.is_ready and not said:
+            os.kill(worker.process.pid, number)
+            pool._receive(wait=False)
+            worker.process.join(timeout=0.01)
+        pool.submit(TESTS, encode({"agent": learner.agent.state_dict()}), None)
+        while not pool._evaluations[0].is_done and not said:
+            os.kill(worker.process.pid, number)
+            pool._receive(wait=True)
+        assert list(pool.collect(at_most=0)) == [expected(learner)]
+    assert (said, worker.process.exitcode) == ([], -signal.SIGKILL)
+    assert capfd.readouterr().err == ""
+
+
+def test_starting_workers_leaves_this_process_hearing_stop_signals_as_before():
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, ())
+    with open_pool(n_workers=1):
+        assert signal.pthread_sigmask(signal.SIG_BLOCK, ()) == before
 
 
 def test_closing_a_pool_twice_is_harmless_and_leaves_no_process():

@@ -23,6 +23,37 @@ def runs(tmp_path_factory):
     return [load_run(make_toy_folder(root / name, seed=seed, learner=learner)) for name, seed, learner in names]
 
 
+def test_a_goal_that_the_run_has_not_is_refused_in_words(tmp_path):
+    folder = make_toy_folder(tmp_path)
+    for name, goal in (("goals", "9"), ("evaluations", "-1")):
+        path = tmp_path / f"{name}.csv"
+        whole = path.read_text()
+        head, row, *rest = whole.splitlines()
+        at = head.split(",").index("goal")
+        cells = row.split(",")
+        path.write_text("\n".join([head, ",".join([*cells[:at], goal, *cells[at + 1 :]]), *rest, ""]))
+        with pytest.raises(RunFolderError, match=rf"{name}\.csv: line 2: expected a goal from 0 to 3, got {goal}"):
+            load_run(folder)
+        path.write_text(whole)
+
+
+def test_an_epoch_out_of_turn_is_refused_in_words(tmp_path):
+    folder = make_toy_folder(tmp_path)
+    path = tmp_path / "goals.csv"
+    lines = path.read_text().splitlines(keepends=True)
+    path.write_text("".join([*lines[:3], *lines[4:]]))
+    with pytest.raises(RunFolderError, match=r"goals\.csv: line 4: expected epoch 2, got 3"):
+        load_run(folder)
+
+
+def test_a_colour_that_is_none_is_refused_in_words(tmp_path):
+    folder = make_toy_folder(tmp_path)
+    manifest = tmp_path / "run.json"
+    manifest.write_text(manifest.read_text().replace("0.95", "1.95"))
+    with pytest.raises(RunFolderError, match=r"bytes that are not that .*colour"):
+        load_run(folder)
+
+
 def with_manifest(run, **changes):
     return msgspec.structs.replace(run, manifest=msgspec.structs.replace(run.manifest, **changes))
 
