@@ -18,7 +18,7 @@ _BAD_ARGUMENTS = (TypeError, ValueError, LookupError, ArithmeticError)
 
 
 def compile_call(node: Call, scope: Scope, compiled: Callable[[Expression], Code[Value]]) -> Code[Value]:
-    """Compile a call; what is wrong with it shows when it runs, as on a robot.
+    """Compile a call of a function that there is; what is wrong with its arguments shows when it runs, as on a robot.
 
     Args:
         node: The call.
@@ -34,9 +34,7 @@ def compile_call(node: Call, scope: Scope, compiled: Callable[[Expression], Code
             return _failing(f"'{node.name}' is a thread, start it with run {node.name}()")
         routine = scope.context.routine(definition, around)
         return _call_of_routine(node, scope.context, routine, _bound(definition, positional, keywords))
-    builtin = scope.context.builtins.get(node.name)
-    if builtin is None:
-        return _failing(f"the function '{node.name}' is not defined, neither in the program nor as a builtin")
+    builtin = scope.context.builtins[node.name]
     mistake = _signature_mistake(scope.context.signature(node.name), len(positional), keywords)
     if mistake:
         return _failing(f"{node.name}(): {mistake}")
