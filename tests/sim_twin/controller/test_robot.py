@@ -181,6 +181,16 @@ def test_power_comes_up_through_the_dashboard():
     assert robot.outputs["joint_mode"]() == (253,) * 6
 
 
+def test_power_and_brakes_asked_for_again_change_nothing():
+    robot = started(FOREVER)
+    robot.panel.power_on()
+    robot.panel.brake_release()
+    robot.panel.unlock_protective_stop()
+    run(robot, 10)
+    assert (state_of(robot), robot.machine.modes.robot) == (PLAYING, RobotMode.RUNNING)
+    assert robot.machine.modes.safety is SafetyMode.NORMAL
+
+
 def test_an_emergency_stop_takes_the_power_and_is_recovered_from_by_hand():
     robot = started("def f():\n q = get_actual_joint_positions()\n q[0] = q[0] + 1\n movej(q)\nend\n")
     run(robot, 300)
