@@ -1,5 +1,7 @@
 """Zenoh sessions that listen and connect where they are told, and nowhere else."""
 
+import json
+
 import zenoh
 
 from robot.errors import WireError
@@ -30,10 +32,14 @@ def open_session(endpoint: str, *, is_hub: bool) -> zenoh.Session:
     config.insert_json5("mode", '"router"' if is_hub else '"client"')
     config.insert_json5("scouting/multicast/enabled", "false")
     config.insert_json5("scouting/gossip/enabled", "false")
-    config.insert_json5("listen/endpoints", f'["{endpoint}"]' if is_hub else "[]")
-    config.insert_json5("connect/endpoints", "[]" if is_hub else f'["{endpoint}"]')
     config.insert_json5("connect/timeout_ms", str(CONNECT_MS))
     config.insert_json5("connect/exit_on_failure", "true")
+    here = json.dumps([endpoint])
+    try:
+        config.insert_json5("listen/endpoints", here if is_hub else "[]")
+        config.insert_json5("connect/endpoints", "[]" if is_hub else here)
+    except zenoh.ZError as error:
+        raise BusError(f"bus: expected an endpoint such as tcp/127.0.0.1:7447, got {endpoint!r}") from error
     try:
         return zenoh.open(config)
     except zenoh.ZError as error:

@@ -37,7 +37,7 @@ RATE_HZ = 500.0
 FIELDS = (
     "timestamp", "actual_q", "actual_qd", "actual_TCP_pose", "actual_TCP_force", "actual_digital_input_bits",
     "actual_digital_output_bits", "robot_mode", "runtime_state", "safety_status_bits", "target_speed_fraction",
-    "payload",
+    "payload", "payload_cog",
 )  # fmt: skip
 """All that is read here. Left to itself the client asks for 58 and more, which the controller would pack, and a thread
 beside the servo loop unpack, 500 times a second."""

@@ -17,7 +17,7 @@ WATCHDOG_HZ = 10.0
 PROOF_S = 0.5
 """Time on the controller's clock in which an armed and starved watchdog must have stopped the program."""
 PROOF_WALL_S = 5.0
-PAYLOAD_TOLERANCE_KG, TCP_TOLERANCE = 0.05, 1e-4
+PAYLOAD_TOLERANCE_KG, CENTRE_TOLERANCE_M, TCP_TOLERANCE = 0.05, 1e-4, 1e-4
 REASON_TICKS = 5
 
 
@@ -74,7 +74,7 @@ def prove_watchdog(control: RTDEControlInterface, receive: RTDEReceiveInterface,
 
 
 def set_tool(control: RTDEControlInterface, receive: RTDEReceiveInterface, clock: Clock, tool: Tool) -> None:
-    """Set payload and tool centre point, and read both back.
+    """Set payload, its mass and centre, and tool centre point, and read them back.
 
     Raises:
         ArmRefusedError: the controller has others.
@@ -85,7 +85,16 @@ def set_tool(control: RTDEControlInterface, receive: RTDEReceiveInterface, clock
     if any(abs(a - b) > TCP_TOLERANCE for a, b in zip(control.getTCPOffset(), tcp, strict=True)):
         raise ArmRefusedError(f"expected tool centre point {tcp}, the controller says {control.getTCPOffset()}")
     deadline_ns = monotonic_ns() + round(PROOF_S * 1e9)
-    while abs(receive.getPayload() - tool.mass_kg) > PAYLOAD_TOLERANCE_KG:
+    while not _carries(receive, tool):
         if monotonic_ns() > deadline_ns:
-            raise ArmRefusedError(f"expected payload {tool.mass_kg} kg, the controller says {receive.getPayload()}")
+            raise ArmRefusedError(
+                f"expected payload {tool.mass_kg} kg at {[*tool.com_m]} m of the flange, "
+                f"the controller says {receive.getPayload()} kg at {receive.getPayloadCog()} m"
+            )
         clock.wait_tick()
+
+
+def _carries(receive: RTDEReceiveInterface, tool: Tool) -> bool:
+    """Return whether the controller reckons with a tool's mass and centre of mass."""
+    off_m = [abs(a - b) for a, b in zip(receive.getPayloadCog(), tool.com_m, strict=True)]
+    return abs(receive.getPayload() - tool.mass_kg) <= PAYLOAD_TOLERANCE_KG and max(off_m) <= CENTRE_TOLERANCE_M

@@ -3,7 +3,9 @@
 from sim_twin.broken.course import Course
 from sim_twin.broken.judge import Judged, Motion
 from sim_twin.broken.outcome import Outcome
-from sim_twin.broken.rider import DisturbedError, Raised, Rider
+from sim_twin.broken.rider import CutShortError, DisturbedError, Raised, Rider
 from sim_twin.broken.trials import TRIALS, Trial
 
-__all__ = ["TRIALS", "Course", "DisturbedError", "Judged", "Motion", "Outcome", "Raised", "Rider", "Trial"]
+__all__ = [
+    "TRIALS", "Course", "CutShortError", "DisturbedError", "Judged", "Motion", "Outcome", "Raised", "Rider", "Trial",
+]  # fmt: skip

@@ -5,7 +5,7 @@ from time import perf_counter
 from robot.bench import BenchReport, BenchResult, bench_report
 from sim_twin.broken.course import Course
 from sim_twin.broken.outcome import NOTICED_S, Outcome
-from sim_twin.broken.rider import DisturbedError
+from sim_twin.broken.rider import CutShortError, DisturbedError
 from sim_twin.broken.trials import TRIALS, Trial
 
 __all__ = ["bench_faults"]
@@ -28,9 +28,10 @@ def bench_faults(*, full: bool) -> BenchReport:
 def _row(course: Course, trial: Trial) -> BenchResult:
     try:
         return _told(course.run(trial))
-    except DisturbedError as error:
+    except (CutShortError, DisturbedError) as error:
+        why = "disturbed" if isinstance(error, DisturbedError) else "wrong"
         return BenchResult(
-            name=trial.name, value=0.0, unit="ms", goal="undisturbed", ok=False, details={"disturbed": str(error)}
+            name=trial.name, value=0.0, unit="ms", goal="undisturbed", ok=False, details={why: str(error)}
         )
 
 

@@ -31,13 +31,9 @@ class Outcome(msgspec.Struct, frozen=True, kw_only=True):
     again: Raised | None
     """What came up when it was moved again; None where it moved."""
 
-    def failures(self, *, noticed_s: float = NOTICED_S) -> tuple[str, ...]:
-        """Return what is not as asked, in words.
-
-        Args:
-            noticed_s: how soon a fault must have been told; more where the machine is shared.
-        """
-        wrong = list(self._wrong_stop(noticed_s)) if self.trial.is_stop else []
+    def failures(self) -> tuple[str, ...]:
+        """Return what is not as asked, in words."""
+        wrong = list(self._wrong_stop()) if self.trial.is_stop else []
         if self.trial.bars and self.barred is None:
             wrong.append("the arm could be taken while the fault lasted")
         if self.jogged_rad is not None and not 0.9 * JOG_RAD < self.jogged_rad < 1.1 * JOG_RAD:
@@ -65,11 +61,11 @@ class Outcome(msgspec.Struct, frozen=True, kw_only=True):
         found["again"] = "moves" if self.again is None else self.again.what
         return found
 
-    def _wrong_stop(self, noticed_s: float) -> tuple[str, ...]:
+    def _wrong_stop(self) -> tuple[str, ...]:
         if self.noticed_s is None or self.stop is None:
             return ("not noticed",)
         wrong: list[str] = []
-        if not self.noticed_s <= noticed_s:
+        if not self.noticed_s <= NOTICED_S:
             wrong.append(f"noticed after {1e3 * self.noticed_s:.0f} ms")
         if not self.stop.rest_s <= self.stop.predicted_s + REST_SLACK_S:
             wrong.append(f"rest after {self.stop.rest_s:.3f} s, predicted {self.stop.predicted_s:.3f} s")

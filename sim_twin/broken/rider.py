@@ -13,7 +13,7 @@ from robot.errors import RobotError
 from robot.messages import ArmState, GripCommand, Twist
 from robot.servo_client import ServoClient
 
-__all__ = ["DisturbedError", "Raised", "Rider", "wire_rig"]
+__all__ = ["CutShortError", "DisturbedError", "Raised", "Rider", "wire_rig"]
 
 SPEED_M_S = 0.35
 REACH_M = 0.16
@@ -25,6 +25,10 @@ NEVER_S = 3.0
 
 class DisturbedError(RuntimeError):
     """Something came up before anything was made to go wrong: this machine was busy elsewhere for too long."""
+
+
+class CutShortError(RuntimeError):
+    """Something came up that nothing was made to go wrong for, and this machine was not busy."""
 
 
 class Raised(msgspec.Struct, frozen=True, kw_only=True):

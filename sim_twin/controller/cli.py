@@ -33,6 +33,7 @@ def controller(
     """Run a virtual UR controller until Ctrl-C; unmodified clients connect to it."""
     if context.invoked_subcommand is not None:
         return
+    from config.errors import ConfigError
     from sim_twin.controller.server import ControllerServer, Setup
 
     try:
@@ -51,8 +52,8 @@ def controller(
         server = ControllerServer(setup)
         with server:
             server.run(when_ready=lambda: typer.echo(f"virtual UR5e {version} ready on {host}"))
-    except (OSError, ValueError) as error:
-        typer.echo(f"error: {error}", err=True)
+    except (OSError, ValueError, ConfigError) as error:
+        typer.echo(f"error: {' '.join(str(error).split())}", err=True)
         raise typer.Exit(2) from None
     except KeyboardInterrupt:
         typer.echo("stopped")
@@ -70,9 +71,21 @@ def fault(
     from sim_twin.controller.process import ControllerProcessError, ask_fault
 
     try:
-        pairs = dict(number.split("=", 1) for number in numbers or [])
-        given = {key: msgspec.json.decode(value) for key, value in pairs.items()}
+        given = dict(map(_argument, numbers or []))
+    except (ValueError, RecursionError) as error:
+        typer.echo(f"error: arguments: {error}", err=True)
+        raise typer.Exit(2) from None
+    try:
         typer.echo(msgspec.json.encode(ask_fault(host, name, **given)).decode())
-    except (ControllerProcessError, ValueError, msgspec.DecodeError) as error:
+    except ControllerProcessError as error:
         typer.echo(f"error: {error}", err=True)
         raise typer.Exit(1) from None
+
+
+def _argument(text: str) -> tuple[str, object]:
+    import msgspec
+
+    key, sign, value = text.partition("=")
+    if not sign:
+        raise ValueError(f"expected name=value, got {text!r}")
+    return key, msgspec.json.decode(value)

@@ -9,7 +9,7 @@ from typing import Protocol
 import msgspec
 
 from sim_twin.controller.motion import SLICE_S
-from sim_twin.controller.script import Builtins, Interpreter, ScriptSyntaxError, parse_program
+from sim_twin.controller.script import Builtins, Interpreter, ScriptNameError, ScriptSyntaxError, parse_program
 from sim_twin.controller.script.builtins import Sockets
 
 __all__ = ["Compiled", "Compiler", "InlineCompiler", "Mistake", "ThreadCompiler", "compile_text"]
@@ -20,9 +20,17 @@ MakeBuiltins = Callable[[Sockets], Builtins]
 
 
 class Mistake(msgspec.Struct, frozen=True, kw_only=True):
-    """Why a text is no program."""
+    """Why a text is no program.
+
+    Attributes:
+        message: For a person.
+        as_reported: As a robot says it on the primary port; empty where a robot has no word for it.
+        line: Where, counted from one; 0 where it is no place in the text.
+        column: Where on that line.
+    """
 
     message: str
+    as_reported: str = ""
     line: int = 0
     column: int = 0
 
@@ -69,8 +77,8 @@ def compile_text(text: str, make_builtins: MakeBuiltins) -> Compiled | Mistake:
         program = parse_program(text)
         sockets = Sockets(slice_s=SLICE_S)
         interpreter = Interpreter(program, make_builtins(sockets))
-    except ScriptSyntaxError as error:
-        return Mistake(message=str(error), line=error.line, column=error.column)
+    except (ScriptSyntaxError, ScriptNameError) as error:
+        return Mistake(message=str(error), as_reported=error.as_reported, line=error.line, column=error.column)
     except RecursionError:
         return Mistake(message="the program is nested too deep; use fewer brackets and blocks in one another")
     return Compiled(program.name, is_secondary=program.is_secondary, interpreter=interpreter, sockets=sockets)

@@ -42,5 +42,7 @@ class ControlPort:
         try:
             asked = msgspec.json.decode(line, type=dict[str, object])
             return self._faults.apply(str(asked.pop("fault", "")), **asked)
+        except RecursionError:
+            return {"error": "expected one flat JSON object, got one nested too deep"}
         except (msgspec.DecodeError, FaultError) as error:
             return {"error": str(error)}

@@ -1,21 +1,35 @@
 """What can be made to go wrong with a virtual controller, and the truth to judge it by."""
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from inspect import Parameter, signature
+from typing import Annotated, TypeAlias, get_type_hints
 
 import msgspec
 import numpy as np
 
+from sim_twin.controller.io import N_DIGITAL
 from sim_twin.controller.motion import DhRow, Measured, calibrated
 from sim_twin.controller.robot import VirtualRobot
 from sim_twin.controller.states import Event
 from sim_twin.controller.ticks import TickTimes
-from sim_twin.controller.wire import Wires
+from sim_twin.controller.wire import Wires, input_fields
 
 __all__ = ["FaultError", "Faults"]
 
 SLICES_PER_MS = 0.5
 Answer = dict[str, object]
+Milliseconds: TypeAlias = Annotated[float, msgspec.Meta(ge=0.0, le=10_000.0)]
+Often: TypeAlias = Annotated[int, msgspec.Meta(ge=1, le=1_000_000)]
+Angle: TypeAlias = Annotated[float, msgspec.Meta(ge=-6.3, le=6.3)]
+Angles: TypeAlias = tuple[Angle, Angle, Angle, Angle, Angle, Angle]
+Torque: TypeAlias = Annotated[float, msgspec.Meta(ge=-300.0, le=300.0)]
+"""Twice what the strongest joint of such an arm gives."""
+Torques: TypeAlias = tuple[Torque, Torque, Torque, Torque, Torque, Torque]
+Deviation: TypeAlias = Annotated[float, msgspec.Meta(ge=0.0, le=0.5)]
+OffNominal: TypeAlias = Annotated[float, msgspec.Meta(ge=0.0, le=100.0)]
+Bits: TypeAlias = Annotated[int, msgspec.Meta(ge=0, lt=1 << N_DIGITAL)]
+Lines: TypeAlias = Annotated[int, msgspec.Meta(ge=1, le=1000)]
 
 
 class FaultError(ValueError):
@@ -61,7 +75,7 @@ class Faults:
             "program_stop": lambda: self._happen(Event.STOP),
             "protective_stop": lambda: self._happen(Event.PROTECTIVE_STOP),
             "push": self.push,
-            "reduced": lambda on=True: self._happen(Event.REDUCED if on else Event.REDUCED_ENDED),
+            "reduced": self.reduced,
             "refuse": self.refuse_links,
             "remote": self.remote_control,
             "reserve": self.reserve,
@@ -77,7 +91,7 @@ class Faults:
         """What can be asked for."""
         return tuple(sorted(self._by_name))
 
-    def apply(self, name: str, **numbers: object) -> Answer:
+    def apply(self, name: str, /, **numbers: object) -> Answer:
         """Bring a fault about, or end it, and return what it tells, and when it was (at_s, the host's monotonic time).
 
         Raises:
@@ -86,9 +100,10 @@ class Faults:
         fault = self._by_name.get(name)
         if fault is None:
             raise FaultError(f"expected one of {', '.join(self.names)}; got {name!r}")
+        arguments = _typed(name, fault, numbers)
         try:
-            return {**(fault(**numbers) or {}), "at_s": time.monotonic()}
-        except (TypeError, ValueError) as error:
+            return {**(fault(**arguments) or {}), "at_s": time.monotonic()}
+        except ValueError as error:
             raise FaultError(f"{name}: {error}") from error
 
     # -------------------------------------------------------------------------------------------------------- links
@@ -103,10 +118,10 @@ class Faults:
         for each in self._ports(port):
             each.refuse() if on else each.listen()
 
-    def delay_links(self, ms: float = 0.0, port: int | None = None) -> None:
+    def delay_links(self, ms: Milliseconds = 0.0, port: int | None = None) -> None:
         """Let everything said in either direction be late; 0 ends it."""
         for each in self._ports(port):
-            each.delay_ticks = max(0, round(ms * SLICES_PER_MS))
+            each.delay_ticks = round(ms * SLICES_PER_MS)
 
     def freeze_interfaces(self, on: bool = True, port: int | None = None) -> None:
         """Let the ports stand still while physics and programs go on."""
@@ -119,6 +134,9 @@ class Faults:
 
     def reserve(self, names: list[str] | None = None) -> None:
         """Let a field bus own these RTDE inputs; no names frees them."""
+        strange = sorted(set(names or []) - input_fields(self._robot.machine.version).keys())
+        if strange:
+            raise ValueError(f"expected names of RTDE inputs, got {strange[0][:40]!r}")
         self._wires.rtde.reserve(names or [])
 
     def remote_control(self, on: bool = True) -> None:
@@ -127,10 +145,8 @@ class Faults:
 
     # ---------------------------------------------------------------------------------------------- time and sensors
 
-    def late_ticks(self, ms: float = 0.0, every: int = 1) -> None:
+    def late_ticks(self, ms: Milliseconds = 0.0, every: Often = 1) -> None:
         """Let every so many slices take so much longer; 0 ms ends it."""
-        if not 0.0 <= ms <= 10_000.0 or every < 1:
-            raise ValueError(f"expected 0 to 10000 ms and every 1 or more, got {ms} ms every {every}")
         self._late_s, self._n_late_every, self._n_ticks = ms * 1e-3, every, 0
 
     def delay(self) -> None:
@@ -140,24 +156,21 @@ class Faults:
             if self._n_ticks % self._n_late_every == 0:
                 time.sleep(self._late_s)
 
-    def bias(self, rad: list[float] | None = None) -> None:
+    def bias(self, rad: Angles | None = None) -> None:
         """Let the joints be read so much off; nothing ends it."""
-        bias = np.zeros(6) if rad is None else np.array(rad, dtype=np.float64)
-        if bias.shape != (6,):
-            raise ValueError(f"expected 6 angles, got {bias.size}")
-        self._bias_rad = bias
+        self._bias_rad = np.zeros(6) if rad is None else np.array(rad)
         self._set_disturbance()
 
-    def noise(self, rad: float = 0.0) -> None:
+    def noise(self, rad: Deviation = 0.0) -> None:
         """Let the joints be read with normal noise of a standard deviation; 0 ends it."""
-        self._noise_rad = float(rad)
+        self._noise_rad = rad
         self._set_disturbance()
 
     def payload(self, kg: float = 0.0) -> None:
         """Let so much more hang on the flange than the controller was told; 0 ends it."""
-        self._robot.machine.drive.hang(float(kg))
+        self._robot.machine.drive.hang(kg)
 
-    def calibrate(self, mm: float = 0.0, mrad: float = 0.0) -> Answer:
+    def calibrate(self, mm: OffNominal = 0.0, mrad: OffNominal = 0.0) -> Answer:
         """Let the controller's Denavit-Hartenberg rows differ from nominal by as much, each by chance; 0 ends it.
 
         Told back as rows of (a m, d m, alpha rad, theta rad).
@@ -169,23 +182,22 @@ class Faults:
         kinematics.recalibrate(calibrated(kinematics.nominal, deltas))
         return {"rows": off.tolist()}
 
-    def jog(self, rad: list[float]) -> None:
+    def jog(self, rad: Angles) -> None:
         """Let somebody at the pendant move the joints by as much, with a program of his own."""
-        if len(rad) != 6:
-            raise ValueError(f"expected 6 angles, got {len(rad)}")
-        q = [float(a) + float(b) for a, b in zip(self._robot.machine.drive.measured.q_rad, rad, strict=True)]
+        q = (self._robot.machine.drive.measured.q_rad + np.array(rad)).tolist()
         self._robot.submit_script(f"def jog():\n movej({q}, a=1.0, v=0.5)\nend\n")
 
-    def force_inputs(self, bits: int = 0) -> None:
+    def force_inputs(self, bits: Bits = 0) -> None:
         """Let these digital inputs be on, whatever the table says."""
         self._robot.forced_inputs = bits
 
-    def push(self, nm: list[float] | None = None) -> None:
+    def push(self, nm: Torques | None = None) -> None:
         """Push on the joints from outside, as a person would; nothing ends it."""
-        torques = [0.0] * 6 if nm is None else [float(t) for t in nm]
-        if len(torques) != 6:
-            raise ValueError(f"expected 6 torques, got {len(torques)}")
-        self._robot.machine.world.data.qfrc_applied[:6] = torques
+        self._robot.machine.world.data.qfrc_applied[:6] = nm or (0.0,) * 6
+
+    def reduced(self, on: bool = True) -> Answer:
+        """Let the reduced mode begin or end."""
+        return self._happen(Event.REDUCED if on else Event.REDUCED_ENDED)
 
     # ------------------------------------------------------------------------------------------------------- judging
 
@@ -212,9 +224,9 @@ class Faults:
             self._ticks.clear()
         return answer
 
-    def log(self, last: int = 100) -> Answer:
+    def log(self, last: Lines = 100) -> Answer:
         """Return the log's last lines."""
-        lines = list(self._robot.machine.journal.lines)[-max(1, last) :]
+        lines = list(self._robot.machine.journal.lines)[-last:]
         return {"lines": [text for _, text in lines]}
 
     # -------------------------------------------------------------------------------------------------------- inside
@@ -239,3 +251,25 @@ class Faults:
         drive = self._robot.machine.drive
         q = measured.q_rad + self._bias_rad + self._rng.normal(0.0, 1.0, 6) * self._noise_rad
         return msgspec.structs.replace(measured, q_rad=q, tcp_pose=drive.kinematics.pose(q, drive.core.tcp_offset))
+
+
+def _typed(name: str, fault: Callable[..., Answer | None], numbers: Mapping[str, object]) -> dict[str, object]:
+    """Return a fault's arguments as its signature types and bounds them.
+
+    Raises:
+        FaultError: they are not what it takes.
+    """
+    known = signature(fault).parameters
+    strange = [key for key in numbers if key not in known]
+    missing = [key for key, p in known.items() if p.default is Parameter.empty and key not in numbers]
+    if strange or missing:
+        takes = ", ".join(known) or "none"
+        raise FaultError(f"{name}: expected the arguments {takes}; got {', '.join(numbers)[:80] or 'none'}")
+    hints = get_type_hints(fault, include_extras=True)
+    typed: dict[str, object] = {}
+    for key, value in numbers.items():
+        try:
+            typed[key] = msgspec.convert(value, hints[key])
+        except msgspec.ValidationError as error:
+            raise FaultError(f"{name}: {key}: {error}") from error
+    return typed

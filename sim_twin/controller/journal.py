@@ -69,10 +69,12 @@ class Journal:
         self.note(f"{title}: {text}")
         self.outbox.append(pack_key(0, stamp_us=self._stamp_us(), title=title, text=text))
 
-    def exception(self, *, program: str, thread: str, line: int, column: int, message: str) -> None:
-        """Say where a program failed, and why."""
+    def exception(
+        self, *, program: str, thread: str, line: int, column: int, message: str, as_reported: str = ""
+    ) -> None:
+        """Say where a program failed, and why: to the log, and as a robot reports it on the primary port."""
         self.note(f"program {program}, thread {thread}, line {line}: {message}")
-        text = f"{program}: {message}"
+        text = as_reported or message
         self.outbox.append(pack_runtime_exception(line, column, text, stamp_us=self._stamp_us()))
 
     def error(self, code: int, argument: int, text: str, *, is_violation: bool = False) -> None:

@@ -13,7 +13,7 @@ from sim_twin.controller.program import Programs
 from sim_twin.controller.states import RobotMode
 from sim_twin.controller.wire import Outputs, Value
 
-__all__ = ["BUS_V", "JOINT_V", "elbow", "joint_mode", "make_outputs"]
+__all__ = ["BUS_V", "COPIES", "JOINT_V", "elbow", "joint_mode", "make_outputs"]
 
 Getters = dict[str, Callable[[], Value]]
 BUS_V, JOINT_V = 48.0, 48.0
@@ -22,6 +22,7 @@ _BYTE = 0xFF
 _STEP_S = 1e-6
 _NO_VECTOR = (0.0,) * 6
 _NOT_THERE = (
+    "target_execution_time",
     "actual_momentum",
     "io_current",
     "euromap67_24V_voltage",
@@ -33,6 +34,7 @@ _NOT_THERE = (
     "collision_detection_ratio",
 )
 _NOT_COUNTED = (
+    "time_scale_source",
     "euromap67_input_bits",
     "euromap67_output_bits",
     "tool_analog_input_types",
@@ -44,8 +46,23 @@ _NOT_COUNTED = (
 )
 
 
+COPIES = {
+    "ft_raw_wrench": "actual_TCP_force",
+    "wrench_calc_from_currents": "actual_TCP_force",
+    "target_current": "actual_current",
+    "joint_control_output": "actual_current",
+    "target_moment": "actual_current_as_torque",
+}
+"""Fields that the twin has no figure of its own for, and the measured ones that stand in."""
+
+
 def make_outputs(machine: Machine, programs: Programs) -> Outputs:
     """Return a getter for every output field."""
+    found = _own_outputs(machine, programs)
+    return {**found, **{name: found[original] for name, original in COPIES.items()}}
+
+
+def _own_outputs(machine: Machine, programs: Programs) -> Getters:
     return {
         **machine.registers.getters(),
         **_asked(machine),
@@ -80,16 +97,13 @@ def elbow(rows: tuple[DhRow, ...], q_rad: Array) -> tuple[float, float, float]:
 
 
 def _asked(machine: Machine) -> Getters:
-    setpoint, drive = machine.drive.motions.setpoint, machine.drive
+    setpoint = machine.drive.motions.setpoint
     return {
         "target_q": lambda: setpoint.q_target.tolist(),
         "target_qd": lambda: setpoint.qd_target.tolist(),
         "target_qdd": lambda: setpoint.qdd_target.tolist(),
-        "target_current": lambda: drive.measured.current_a.tolist(),
-        "target_moment": lambda: drive.measured.torque_nm.tolist(),
         "target_TCP_pose": lambda: machine.target_tool()[0],
         "target_TCP_speed": lambda: machine.target_tool()[1],
-        "joint_control_output": lambda: drive.measured.current_a.tolist(),
     }
 
 
@@ -124,10 +138,7 @@ def _forces(machine: Machine) -> Getters:
 
     return {
         "actual_TCP_force": wrench,
-        "ft_raw_wrench": wrench,
-        "wrench_calc_from_currents": wrench,
         "tcp_force_scalar": lambda: float(np.linalg.norm(drive.measured.wrench[:3])),
-        "target_base_wrench": lambda: _NO_VECTOR,
     }
 
 
@@ -137,10 +148,8 @@ def _modes(machine: Machine, programs: Programs) -> Getters:
         "timestamp": lambda: machine.time_s,
         "control_step": lambda: machine.drive.n_slices,
         "actual_execution_time": lambda: machine.execution_s * 1e3,
-        "target_execution_time": lambda: 0.0,
         "speed_scaling": lambda: pace.scale,
         "target_speed_fraction": lambda: pace.slider,
-        "time_scale_source": lambda: 0,
         "robot_mode": lambda: int(modes.robot),
         "safety_mode": lambda: int(modes.safety),
         "safety_status": lambda: int(modes.safety),
@@ -193,6 +202,7 @@ def _constants() -> Getters:
         "actual_TCP_acceleration": _NO_VECTOR,
         "target_TCP_acceleration": _NO_VECTOR,
         "target_base_acceleration": _NO_VECTOR,
+        "target_base_wrench": _NO_VECTOR,
         "joint_temperatures": (JOINT_C,) * 6,
         "actual_joint_voltage": (JOINT_V,) * 6,
         "actual_main_voltage": BUS_V,

@@ -24,7 +24,7 @@ class ControllerProcessError(RuntimeError):
     """The controller did not start, or a fault was refused."""
 
 
-def ask_fault(host: str, name: str, **numbers: object) -> dict[str, object]:
+def ask_fault(host: str, name: str, /, **numbers: object) -> dict[str, object]:
     """Bring a fault about at a running controller and return what it tells.
 
     Raises:
@@ -104,7 +104,7 @@ class ControllerProcess:
         """Whether it runs."""
         return self._process is not None and self._process.is_alive()
 
-    def fault(self, name: str, **numbers: object) -> dict[str, object]:
+    def fault(self, name: str, /, **numbers: object) -> dict[str, object]:
         """Bring a fault about, or ask for the truth; see `faults`.
 
         Raises:

@@ -8,6 +8,8 @@ from sim_twin.controller.states import Event, ProgramOrder, Reaction, RuntimeSta
 __all__ = ["UNNAMED", "Programs"]
 
 UNNAMED = "unnamed"
+SECONDARY = "SECONDARY_PROGRAM_EXCEPTION_XXX"
+"""What a robot puts before the reason for which a secondary program failed."""
 
 
 class Programs:
@@ -83,7 +85,12 @@ class Programs:
     def _take(self, done: Compiled | Mistake) -> None:
         if isinstance(done, Mistake):
             self._machine.journal.exception(
-                program=UNNAMED, thread="compiler", line=done.line, column=done.column, message=done.message
+                program=UNNAMED,
+                thread="compiler",
+                line=done.line,
+                column=done.column,
+                message=done.message,
+                as_reported=done.as_reported,
             )
         elif done.is_secondary:
             self._secondary.append(done)
@@ -136,7 +143,12 @@ class Programs:
         fault = program.interpreter.error
         if fault is not None:
             self._machine.journal.exception(
-                program=program.name, thread=fault.thread, line=fault.line, column=0, message=fault.message
+                program=program.name,
+                thread=fault.thread,
+                line=fault.line,
+                column=0,
+                message=fault.message,
+                as_reported=f"{SECONDARY}{fault.message}",
             )
         program.sockets.close()
         return False

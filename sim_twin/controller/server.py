@@ -28,6 +28,7 @@ __all__ = ["ControllerServer", "Setup", "parse_version"]
 
 CONTROL_TICKS = 5
 """The faults' door is looked at this often: a look costs as much as a tenth of the physics."""
+PLAYED, MOST_MINOR = (3, 5), 99
 SWITCH_S = 0.0002
 """How long the compiler's thread may keep the interpreter from the loop."""
 
@@ -55,13 +56,19 @@ def parse_version(text: str) -> ControllerVersion:
     """Return the version of three or four numbers with dots.
 
     Raises:
-        ValueError: it is none.
+        ValueError: it is none, or of a box that this controller does not play.
     """
     parts = text.split(".")
-    if not 2 <= len(parts) <= 4 or not all(part.isdigit() for part in parts):
-        raise ValueError(f"version: expected numbers such as 5.11.0, got {text!r}")
+    if not 2 <= len(parts) <= 4 or not all(part.isascii() and part.isdecimal() and len(part) <= 9 for part in parts):
+        raise ValueError(f"version: expected numbers such as 5.11.0, got {text[:40]!r}")
     fields = dict(zip(("major", "minor", "bugfix", "build"), map(int, parts), strict=False))
-    return ControllerVersion(**fields)
+    version = ControllerVersion(**fields)
+    if version.major not in PLAYED or version.minor > MOST_MINOR:
+        raise ValueError(
+            f"version: expected 3.x (CB3) or 5.x (e-Series) up to .{MOST_MINOR}, got {text}; "
+            "PolyScope X is another controller, and there are no others"
+        )
+    return version
 
 
 class ControllerServer:

@@ -3,10 +3,13 @@
 from pathlib import Path
 from typing import Self
 
-__all__ = ["Spare", "spare_share"]
+__all__ = ["SPARE_SHARE", "Spare", "spare_share"]
 
 _STAT = Path("/proc/stat")
 IDLE, IOWAIT = 3, 4
+SPARE_SHARE = 0.3
+"""Where less than this of the processors' time was idle, processes had to wait for one another. Nobody else about, the
+three that move an arm over the wire leave half of two."""
 
 
 class Spare:

@@ -21,16 +21,13 @@ from sim_twin.controller.process import ControllerProcess
 from sim_twin.controller.server import Setup
 from sim_twin.paired.curves import Distance, Track, compare
 from sim_twin.paired.errands import Errand, Kind, drive_errand
-from sim_twin.paired.machine import Spare
+from sim_twin.paired.machine import SPARE_SHARE, Spare
 from sim_twin.paired.wire import Wire
 from sim_twin.plant import TwinPlant
 
 __all__ = ["Compared", "CutShortError", "DisturbedError", "Pair", "wired_rig"]
 
 N_TRIES = 6
-SPARE_SHARE = 0.3
-"""Where less than this of the processors' time was idle, processes had to wait for one another. Nobody else about, the
-three of an errand leave half of two."""
 BUS_PORT = 7447
 
 

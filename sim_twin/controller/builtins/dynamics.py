@@ -7,7 +7,7 @@ from sim_twin.controller.builtins.moving import as_list
 from sim_twin.controller.machine import Machine
 from sim_twin.controller.motion.poses import Array, matrix_from_pose
 from sim_twin.controller.script import Builtins, Value
-from sim_twin.controller.script.builtins import flag, numbers, pose
+from sim_twin.controller.script.builtins import flag, pose, vector
 
 __all__ = ["dynamics_builtins"]
 
@@ -20,10 +20,10 @@ def dynamics_builtins(machine: Machine) -> Builtins:
     dynamics = _Dynamics(machine)
 
     def joints(q: Value) -> Array:
-        return drive.measured.q_rad if q is None else np.array(numbers(q))
+        return drive.measured.q_rad if q is None else np.array(vector(q, 6))
 
     def speeds(qd: Value) -> Array:
-        return drive.measured.qd_rad_s if qd is None else np.array(numbers(qd))
+        return drive.measured.qd_rad_s if qd is None else np.array(vector(qd, 6))
 
     def tool(tcp: Value) -> Array:
         return drive.core.T_ft if tcp is None else matrix_from_pose(pose(tcp))

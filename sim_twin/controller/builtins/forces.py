@@ -5,7 +5,7 @@ import numpy as np
 from sim_twin.controller.machine import Machine
 from sim_twin.controller.motion import ForceKind, ForceTask
 from sim_twin.controller.script import Builtins, Value
-from sim_twin.controller.script.builtins import flag, integer, number, numbers, pose
+from sim_twin.controller.script.builtins import flag, integer, number, numbers, pose, vector
 
 __all__ = ["force_builtins"]
 
@@ -19,10 +19,10 @@ def force_builtins(machine: Machine) -> Builtins:
         core.force_mode(
             ForceTask(
                 frame=tuple(pose(task_frame)),
-                is_compliant=tuple(axis != 0 for axis in _six(selection_vector)),
-                wrench=tuple(_six(wrench)),
-                kind=ForceKind(integer(type)),
-                limits=tuple(_six(limits)),
+                is_compliant=tuple(axis != 0 for axis in vector(selection_vector, 6)),
+                wrench=tuple(vector(wrench, 6)),
+                kind=_kind_of(integer(type)),
+                limits=tuple(vector(limits, 6)),
                 damping=machine.force_damping,
                 gain_scaling=machine.force_gain,
             )
@@ -48,7 +48,7 @@ def force_builtins(machine: Machine) -> Builtins:
         return float(np.linalg.norm(drive.measured.wrench[:3]))
 
     def tool_contact(direction: Value = None) -> Value:
-        way = None if direction is None else np.array(numbers(direction)[:3])
+        way = None if direction is None else np.array(_direction(direction))
         return drive.contact.slices_since_contact(way)
 
     def told_of_sensor(
@@ -74,11 +74,16 @@ def force_builtins(machine: Machine) -> Builtins:
     }
 
 
-def _six(value: Value) -> list[float]:
-    found = numbers(value)
-    if len(found) != 6:
-        raise ValueError(f"expected 6 numbers, got {len(found)}")
-    return found
+def _kind_of(number: int) -> ForceKind:
+    kinds = [int(kind) for kind in ForceKind]
+    if number not in kinds:
+        raise ValueError(f"expected a type from {min(kinds)} to {max(kinds)}, got {number}")
+    return ForceKind(number)
+
+
+def _direction(value: Value) -> list[float]:
+    """Take a direction: three numbers, or six of which the rotation is left."""
+    return vector(value, 6 if len(numbers(value)) == 6 else 3)[:3]
 
 
 def _within(value: float, least: float, greatest: float) -> float:

@@ -2,7 +2,7 @@
 
 from sim_twin.controller.machine import Machine
 from sim_twin.controller.script import Builtins, Value
-from sim_twin.controller.script.builtins import numbers
+from sim_twin.controller.script.builtins import vector
 
 __all__ = ["guiding_builtins"]
 
@@ -15,9 +15,7 @@ def guiding_builtins(machine: Machine) -> Builtins:
     core = machine.drive.core
 
     def freedrive_mode(freeAxes: Value = None, feature: Value = None) -> Value:  # noqa: N803, ARG001 - UR's names; held axes are the base's
-        free = _ALL_AXES if freeAxes is None else tuple(numbers(freeAxes))
-        if len(free) != 6:
-            raise ValueError(f"expected 6 axes, got {len(free)}")
+        free = _ALL_AXES if freeAxes is None else tuple(vector(freeAxes, 6))
         core.freedrive(free)
 
     def teach_mode() -> Value:

@@ -8,7 +8,7 @@ from sim_twin.controller.motion import KinematicsError
 from sim_twin.controller.motion.poses import Array
 from sim_twin.controller.pose import Pose
 from sim_twin.controller.script import Builtins, Value
-from sim_twin.controller.script.builtins import number, numbers, pose
+from sim_twin.controller.script.builtins import number, pose, vector
 
 __all__ = ["kinematics_builtins"]
 
@@ -24,7 +24,7 @@ def kinematics_builtins(machine: Machine) -> Builtins:
         return core.tcp_offset if tcp is None or tcp == _ACTIVE else np.array(pose(tcp))
 
     def get_forward_kin(q: Value = None, tcp: Value = None) -> Value:
-        joints = drive.measured.q_rad if q is None else np.array(numbers(q))
+        joints = drive.measured.q_rad if q is None else np.array(vector(q, 6))
         return as_pose(kinematics.pose(joints, tool(tcp)))
 
     def get_inverse_kin(
@@ -36,8 +36,8 @@ def kinematics_builtins(machine: Machine) -> Builtins:
     ) -> Value:
         number(maxPositionError)
         number(maxOrientationError)
-        near = drive.measured.q_rad if qnear is None else np.array(numbers(qnear))
-        return as_list(kinematics.inverse(numbers(pose(x)), near, tool(tcp)))
+        near = drive.measured.q_rad if qnear is None else np.array(vector(qnear, 6))
+        return as_list(kinematics.inverse(vector(pose(x), 6), near, tool(tcp)))
 
     def get_inverse_kin_has_solution(
         x: Value,
@@ -46,12 +46,12 @@ def kinematics_builtins(machine: Machine) -> Builtins:
         maxOrientationError: Value = 1e-10,  # noqa: N803, ARG001 - UR's name
         tcp: Value = _ACTIVE,
     ) -> Value:
-        near = drive.measured.q_rad if qnear is None else np.array(numbers(qnear))
-        return kinematics.has_solution(numbers(pose(x)), near, tool(tcp))
+        near = drive.measured.q_rad if qnear is None else np.array(vector(qnear, 6))
+        return kinematics.has_solution(vector(pose(x), 6), near, tool(tcp))
 
     def is_within_safety_limits(pose: Value) -> Value:
         try:
-            joints = np.array(core.joints_of(pose) if type(pose) is Pose else numbers(pose))
+            joints = np.array(core.joints_of(pose) if type(pose) is Pose else vector(pose, 6))
         except KinematicsError:
             return False
         limits = drive.limits

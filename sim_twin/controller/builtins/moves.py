@@ -8,7 +8,7 @@ from sim_twin.controller.motion import Motion
 from sim_twin.controller.motion.poses import Array, pose_from_matrix
 from sim_twin.controller.pose import Pose
 from sim_twin.controller.script import Builtins, Value
-from sim_twin.controller.script.builtins import integer, number, numbers
+from sim_twin.controller.script.builtins import integer, number, vector
 
 __all__ = ["move_builtins"]
 
@@ -24,7 +24,7 @@ def move_builtins(machine: Machine) -> Builtins:
     a_max = min(j.acceleration_rad_s2 for j in joints)
 
     def aim(target: Value) -> tuple[list[float], bool]:
-        goal, is_pose = numbers(target), type(target) is Pose
+        goal, is_pose = vector(target, 6), type(target) is Pose
         machine.waypoint = np.array(goal) if is_pose else pose_from_matrix(core.tool_at(np.array(goal)))
         return goal, is_pose
 
@@ -48,7 +48,7 @@ def move_builtins(machine: Machine) -> Builtins:
         return moves.movec(via, to, number(a), number(v), number(r), integer(mode))
 
     def as_pose(target: Value) -> tuple[Array, Array]:
-        goal = np.array(numbers(target))
+        goal = np.array(vector(target, 6))
         pose = goal if type(target) is Pose else pose_from_matrix(core.tool_at(goal))
         return pose, pose
 

@@ -3,7 +3,7 @@
 from sim_twin.controller.builtins.moving import as_list, as_pose
 from sim_twin.controller.machine import Machine
 from sim_twin.controller.script import Builtins, Value
-from sim_twin.controller.script.builtins import number, numbers
+from sim_twin.controller.script.builtins import number, vector
 from sim_twin.controller.script.builtins import pose as as_given
 
 __all__ = ["payload_builtins"]
@@ -33,18 +33,18 @@ def _payload_setters(machine: Machine) -> Builtins:
         return list(drive.payload[1])
 
     def set_payload(m: Value, cog: Value = None) -> Value:
-        drive.set_payload(number(m), known_cog() if cog is None else _n(3, cog))
+        drive.set_payload(number(m), known_cog() if cog is None else vector(cog, 3))
 
     def set_payload_mass(m: Value) -> Value:
         drive.set_payload(number(m), known_cog())
 
     def set_payload_cog(CoG: Value) -> Value:  # noqa: N803 - UR's name
-        drive.set_payload(drive.payload[0], _n(3, CoG))
+        drive.set_payload(drive.payload[0], vector(CoG, 3))
 
     def set_target_payload(m: Value, cog: Value, inertia: Value = None, transition_time: Value = 0) -> Value:
         number(transition_time)
-        drive.set_payload(number(m), _n(3, cog))
-        machine.payload_inertia = [0.0] * 6 if inertia is None else _n(6, inertia)
+        drive.set_payload(number(m), vector(cog, 3))
+        machine.payload_inertia = [0.0] * 6 if inertia is None else vector(inertia, 6)
 
     return {
         "set_payload": set_payload,
@@ -75,16 +75,9 @@ def _payload_getters(machine: Machine) -> Builtins:
 
 def _gravity(machine: Machine) -> Builtins:
     def set_gravity(d: Value) -> Value:
-        machine.gravity = _n(3, d)
+        machine.gravity = vector(d, 3)
 
     def get_gravity() -> Value:
         return list[Value](machine.gravity)
 
     return {"get_gravity": get_gravity, "set_gravity": set_gravity}
-
-
-def _n(n: int, value: Value) -> list[float]:
-    found = numbers(value)
-    if len(found) != n:
-        raise ValueError(f"expected {n} numbers, got {len(found)}")
-    return found

@@ -19,7 +19,7 @@ def register_builtins(machine: Machine) -> Builtins:
         name = text(variable_name)
         if name not in known:
             raise ValueError(f"expected the name of an RTDE input, got '{name}'")
-        machine.watchdogs.set(name, number(min_frequency), WatchdogAction(text(action).lower()))
+        machine.watchdogs.set(name, number(min_frequency), _action_of(text(action)))
 
     return {
         **_reads("input", registers.inputs),
@@ -27,6 +27,13 @@ def register_builtins(machine: Machine) -> Builtins:
         **_writes(registers.outputs),
         "rtde_set_watchdog": rtde_set_watchdog,
     }
+
+
+def _action_of(word: str) -> WatchdogAction:
+    actions = {action.value: action for action in WatchdogAction}
+    if word.lower() not in actions:
+        raise ValueError(f"expected one of the actions {', '.join(actions)}, got '{word}'")
+    return actions[word.lower()]
 
 
 def _reads(direction: str, bank: RegisterBank) -> Builtins:

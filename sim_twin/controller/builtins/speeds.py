@@ -4,7 +4,7 @@ from sim_twin.controller.builtins.moving import in_slices
 from sim_twin.controller.machine import Machine
 from sim_twin.controller.motion import SLICE_S, Motion
 from sim_twin.controller.script import Builtins, Value
-from sim_twin.controller.script.builtins import number, numbers
+from sim_twin.controller.script.builtins import number, vector
 
 __all__ = ["speed_builtins"]
 
@@ -16,13 +16,13 @@ def speed_builtins(machine: Machine) -> Builtins:
     def servoj(
         q: Value, a: Value = 0, v: Value = 0, t: Value = SLICE_S, lookahead_time: Value = 0.1, gain: Value = 300
     ) -> Motion:
-        return servoing.servoj(numbers(q), number(a), number(v), number(t), number(lookahead_time), number(gain))
+        return servoing.servoj(vector(q, 6), number(a), number(v), number(t), number(lookahead_time), number(gain))
 
     def speedj(qd: Value, a: Value = 1.4, t: Value = 0) -> Motion:
-        return speeds.speedj(numbers(qd), number(a), number(t))
+        return speeds.speedj(vector(qd, 6), number(a), number(t))
 
     def speedl(xd: Value, a: Value = 1.2, t: Value = 0, aRot: Value = "a") -> Motion:  # noqa: N803, ARG001 - UR's name; one acceleration serves both
-        return speeds.speedl(numbers(xd), number(a), number(t))
+        return speeds.speedl(vector(xd, 6), number(a), number(t))
 
     def stopj(a: Value = 2.0) -> Motion:
         return speeds.stopj(number(a))
@@ -36,7 +36,7 @@ def speed_builtins(machine: Machine) -> Builtins:
         viscous_scale: Value = None,  # noqa: ARG001 - as above
         coulomb_scale: Value = None,  # noqa: ARG001 - as above
     ) -> Motion:
-        machine.drive.put_torque(numbers(torque))
+        machine.drive.put_torque(vector(torque, 6))
         yield
 
     moving = {

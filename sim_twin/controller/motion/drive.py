@@ -1,5 +1,6 @@
 """The drive: set-points into the twin's servos, 2 ms of physics, measurements out; brakes where there is no power."""
 
+import math
 from collections import deque
 from collections.abc import Sequence
 
@@ -180,10 +181,12 @@ class TwinDrive:
         """Tell the controller what hangs on the flange; what is not so biases the force.
 
         Raises:
-            ValueError: a mass below zero.
+            ValueError: a mass below zero, or a number that is not finite.
         """
-        if not mass_kg >= 0.0:
+        if not 0.0 <= mass_kg < math.inf:
             raise ValueError(f"payload: expected 0 kg or more, got {mass_kg}; give the mass that hangs on the flange")
+        if not np.isfinite(cog_m).all():
+            raise ValueError(f"payload: expected a finite centre of gravity (m), got {[*cog_m]}")
         self._payload = (mass_kg, np.array(cog_m, dtype=np.float64))
 
     def hang(self, extra_kg: float) -> None:

@@ -7,7 +7,13 @@ while interpreter.step() is Status.RUNNING:
 """
 
 from sim_twin.controller.script.code import Builtin, Builtins
-from sim_twin.controller.script.errors import ScriptError, ScriptFault, ScriptRuntimeError, ScriptSyntaxError
+from sim_twin.controller.script.errors import (
+    ScriptError,
+    ScriptFault,
+    ScriptNameError,
+    ScriptRuntimeError,
+    ScriptSyntaxError,
+)
 from sim_twin.controller.script.interpreter import DEFAULT_SLICE_BUDGET, Interpreter, Status
 from sim_twin.controller.script.parser import parse_program
 from sim_twin.controller.script.syntax import Program
@@ -21,6 +27,7 @@ __all__ = [
     "Program",
     "ScriptError",
     "ScriptFault",
+    "ScriptNameError",
     "ScriptRuntimeError",
     "ScriptStruct",
     "ScriptSyntaxError",

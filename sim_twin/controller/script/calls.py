@@ -1,7 +1,7 @@
 """Compiles calls: of the program's functions, of the host's builtins, and `run`."""
 
 import inspect
-from collections.abc import Callable, Generator, Mapping
+from collections.abc import Callable, Generator, Mapping, Sequence
 from types import GeneratorType
 
 from sim_twin.controller.script.code import Builtin, Code, Fast, Frame, Slow, applied
@@ -9,7 +9,7 @@ from sim_twin.controller.script.context import Context, Routine, Scope, takes_ti
 from sim_twin.controller.script.errors import ScriptRuntimeError
 from sim_twin.controller.script.syntax import Call, Definition, Expression, Run
 from sim_twin.controller.script.threads import Steps, Wait
-from sim_twin.controller.script.values import Value, copied
+from sim_twin.controller.script.values import Value, copied, described
 
 __all__ = ["compile_call", "compile_run"]
 
@@ -18,7 +18,7 @@ _BAD_ARGUMENTS = (TypeError, ValueError, LookupError, ArithmeticError)
 
 
 def compile_call(node: Call, scope: Scope, compiled: Callable[[Expression], Code[Value]]) -> Code[Value]:
-    """Compile a call; what is wrong with it shows when it runs, as on a robot.
+    """Compile a call of a function that there is; what is wrong with its arguments shows when it runs, as on a robot.
 
     Args:
         node: The call.
@@ -34,12 +34,10 @@ def compile_call(node: Call, scope: Scope, compiled: Callable[[Expression], Code
             return _failing(f"'{node.name}' is a thread, start it with run {node.name}()")
         routine = scope.context.routine(definition, around)
         return _call_of_routine(node, scope.context, routine, _bound(definition, positional, keywords))
-    builtin = scope.context.builtins.get(node.name)
-    if builtin is None:
-        return _failing(f"the function '{node.name}' is not defined, neither in the program nor as a builtin")
-    mistake = _signature_mistake(scope.context.signature(node.name), len(positional), keywords)
+    builtin = scope.context.builtins[node.name]
+    mistake = _mistake(node.name, _parameters_of(scope.context.signature(node.name)), len(positional), keywords)
     if mistake:
-        return _failing(f"{node.name}(): {mistake}")
+        return _failing(mistake)
     return _call_of_builtin(node, scope.context, builtin, positional, keywords)
 
 
@@ -75,21 +73,35 @@ def _bound(
     definition: Definition, positional: list[Code[Value]], keywords: Mapping[str, Code[Value]]
 ) -> dict[str, Code[Value]] | str:
     """Match arguments with parameters; return what is wrong, where something is."""
-    names = [parameter.name for parameter in definition.parameters]
-    if len(positional) > len(names):
-        return f"{definition.name}() takes {len(names)} arguments, got {len(positional)}"
-    bound = dict(zip(names, positional, strict=False))
-    for name, argument in keywords.items():
-        if name not in names:
-            return f"{definition.name}() has no parameter '{name}'"
-        if name in bound:
-            return f"{definition.name}() got the argument '{name}' twice"
-        bound[name] = argument
-    missing = [parameter.name for parameter in definition.parameters if parameter.default is None]
-    missing = [name for name in missing if name not in bound]
-    if missing:
-        return f"{definition.name}() misses the argument '{missing[0]}'"
-    return bound
+    needed = {parameter.name: parameter.default is None for parameter in definition.parameters}
+    mistake = _mistake(definition.name, needed, len(positional), keywords)
+    return mistake or {**dict(zip(needed, positional, strict=False)), **keywords}
+
+
+def _mistake(
+    function: str, is_needed: Mapping[str, bool] | None, n_positional: int, keywords: Mapping[str, Code[Value]]
+) -> str:
+    """Say what is wrong with the number and names of arguments, where something is; None takes any."""
+    if is_needed is None:
+        return ""
+    names = list(is_needed)
+    if n_positional > len(names):
+        return f"{function}() takes {len(names)} arguments, got {n_positional}"
+    given = set(names[:n_positional])
+    for name in keywords:
+        if name not in is_needed:
+            return f"{function}() has no parameter '{name}'"
+        if name in given:
+            return f"{function}() got the argument '{name}' twice"
+    missing = [name for name in names if is_needed[name] and name not in given and name not in keywords]
+    return f"{function}() misses the argument '{missing[0]}'" if missing else ""
+
+
+def _parameters_of(signature: inspect.Signature | None) -> dict[str, bool] | None:
+    """Return a builtin's parameters and whether each is needed; None where it takes any."""
+    if signature is None or any(p.kind is p.VAR_POSITIONAL for p in signature.parameters.values()):
+        return None
+    return {name: p.default is p.empty for name, p in signature.parameters.items()}
 
 
 def _call_of_routine(
@@ -163,16 +175,11 @@ def _open(context: Context, routine: Routine) -> None:
         raise ScriptRuntimeError(f"{name}() calls itself too deep, at most {_MAX_DEPTH} calls may be open")
 
 
-def _signature_mistake(
-    signature: inspect.Signature | None, n_positional: int, keywords: Mapping[str, Code[Value]]
-) -> str:
-    if signature is None:
-        return ""
-    try:
-        signature.bind(*[None] * n_positional, **dict.fromkeys(keywords))
-    except TypeError as error:
-        return str(error)
-    return ""
+def _reason(error: Exception, values: Sequence[Value]) -> str:
+    """Return what a builtin says is wrong; where only Python said something, say what came."""
+    said = str(error)
+    is_ours = type(error).__module__.startswith("sim_twin.") or said.startswith("expected ") or ": expected " in said
+    return said if is_ours else f"expected other arguments, got {', '.join(map(described, values)) or 'none'}"
 
 
 def _call_of_builtin(
@@ -185,9 +192,9 @@ def _call_of_builtin(
     n_positional, names = len(positional), list(keywords)
     meter = context.meter
 
-    def failed(error: Exception) -> ScriptRuntimeError:
+    def failed(error: Exception, values: Sequence[Value]) -> ScriptRuntimeError:
         meter.line = node.line
-        return ScriptRuntimeError(f"{node.name}(): {error}")
+        return ScriptRuntimeError(f"{node.name}(): {_reason(error, values)}")
 
     def named(*values: Value) -> "Value | Generator[Wait | None, None, Value]":
         given = zip(names, values[n_positional:], strict=True)
@@ -199,7 +206,7 @@ def _call_of_builtin(
         try:
             return function(*map(copied, values))
         except _BAD_ARGUMENTS as error:
-            raise failed(error) from error
+            raise failed(error, values) from error
 
     operands = [*positional, *keywords.values()]
     if takes_time(builtin):
@@ -209,7 +216,7 @@ def _call_of_builtin(
         try:
             result = function(*map(copied, values))
         except _BAD_ARGUMENTS as error:
-            raise failed(error) from error
+            raise failed(error, values) from error
         if type(result) is GeneratorType:
             raise TypeError(f"builtin {node.name} returned a generator, so declare it as a generator function")
         return result  # pyright: ignore[reportReturnType] - no generator, as tested
@@ -220,7 +227,7 @@ def _call_of_builtin(
 def _slow_builtin(
     operands: list[Code[Value]],
     result_of: Callable[..., "Value | Generator[Wait | None, None, Value]"],
-    failed: Callable[[Exception], ScriptRuntimeError],
+    failed: Callable[[Exception, Sequence[Value]], ScriptRuntimeError],
 ) -> Code[Value]:
     def run(frame: Frame) -> Steps[Value]:
         values: list[Value] = []
@@ -232,6 +239,6 @@ def _slow_builtin(
         try:
             return (yield from steps)
         except _BAD_ARGUMENTS as error:
-            raise failed(error) from error
+            raise failed(error, values) from error
 
     return Slow(run)

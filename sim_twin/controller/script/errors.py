@@ -2,7 +2,7 @@
 
 import msgspec
 
-__all__ = ["ScriptError", "ScriptFault", "ScriptRuntimeError", "ScriptSyntaxError"]
+__all__ = ["ScriptError", "ScriptFault", "ScriptNameError", "ScriptRuntimeError", "ScriptSyntaxError"]
 
 
 class ScriptError(Exception):
@@ -15,12 +15,30 @@ class ScriptSyntaxError(ScriptError):
     Attributes:
         line: Where, counted from one.
         column: Where on that line, counted from one.
+        as_reported: What a robot says of it on the primary port.
     """
 
-    def __init__(self, *, line: int, column: int, expected: str, got: str) -> None:
+    def __init__(self, *, line: int, column: int, text: str, expected: str, got: str) -> None:
         super().__init__(f"line {line}, column {column}: expected {expected}, got {got}")
         self.line = line
         self.column = column
+        self.as_reported = f"syntax_error_on_line:{line}:{text}:"
+
+
+class ScriptNameError(ScriptError):
+    """The program uses a name that nothing has; found before it runs.
+
+    Attributes:
+        line: Where, counted from one.
+        column: Where on that line, counted from one.
+        as_reported: What a robot says of it on the primary port.
+    """
+
+    def __init__(self, name: str, *, line: int, column: int) -> None:
+        super().__init__(f"line {line}, column {column}: '{name}' is not defined, neither in the program nor built in")
+        self.line = line
+        self.column = column
+        self.as_reported = f"compile_error_name_not_found:{name}:"
 
 
 class ScriptRuntimeError(ScriptError):

@@ -5,7 +5,7 @@ from typing import NoReturn
 
 from sim_twin.controller.script.arithmetic import int32
 from sim_twin.controller.script.errors import ScriptSyntaxError
-from sim_twin.controller.script.lexer import Token
+from sim_twin.controller.script.lexer import Token, line_at
 from sim_twin.controller.script.syntax import (
     Binary,
     Call,
@@ -87,10 +87,23 @@ class ExpressionParser:
     def fail(self, expected: str, *, got: str = "") -> NoReturn:
         """Give up at the next token."""
         token = self.token
-        column = token.offset - self._text.rfind("\n", 0, token.offset)
         if not got:
             got = token.kind if token.kind == "end of text" else f"'{token.text[:40]}'"
-        raise ScriptSyntaxError(line=token.line, column=column, expected=expected, got=got)
+        raise ScriptSyntaxError(
+            line=token.line,
+            column=self.column(token),
+            text=line_at(self._text, token.offset),
+            expected=expected,
+            got=got,
+        )
+
+    def column(self, token: Token) -> int:
+        """Return where on its line a token begins, counted from one."""
+        return token.offset - self._text.rfind("\n", 0, token.offset)
+
+    def place(self, token: Token) -> tuple[int, int]:
+        """Return a token's line and column."""
+        return token.line, self.column(token)
 
     def expression(self) -> Expression:
         """Parse an expression."""
@@ -167,7 +180,7 @@ class ExpressionParser:
             self.advance()
             if self.kind == "(" and not self.token.is_first:
                 return self._called(token)
-            return Name(token.text)
+            return Name(token.text, *self.place(token))
         if token.kind == "[":
             return ListLiteral(self._bracketed("[", "]"))
         if token.kind == "(":
@@ -199,10 +212,11 @@ class ExpressionParser:
 
     def _started(self) -> Expression:
         self.advance()
+        token = self.token
         name = self.name("a thread's name after 'run'")
         self.expect("(")
         self.expect(")")
-        return Run(name)
+        return Run(name, *self.place(token))
 
     def _bracketed(self, opening: str, closing: str) -> tuple[Expression, ...]:
         self.expect(opening)
@@ -240,7 +254,7 @@ class ExpressionParser:
         self.advance()
         if name.text == "struct" and not positional:
             return StructLiteral(tuple(keywords.items()))
-        return Call(name.text, tuple(positional), tuple(keywords.items()), name.line)
+        return Call(name.text, tuple(positional), tuple(keywords.items()), *self.place(name))
 
     def _keyword(self, keywords: dict[str, Expression]) -> None:
         if self.token.text in keywords:

@@ -39,11 +39,11 @@ def compile_expression(node: Expression, scope: Scope) -> Code[Value]:
 
 
 def compile_read(name: str, scope: Scope) -> Fast[Value]:
-    """Compile reading a variable."""
+    """Compile reading a variable that there is."""
     place = scope.places.get(name)
-    global_place = scope.context.global_places.get(name)
     if place is None:
-        return _read(name, scope.context.globals, global_place) if global_place is not None else _undefined(name)
+        return _read(name, scope.context.globals, scope.context.global_places[name])
+    global_place = scope.context.global_places.get(name)
     if name in scope.is_open and global_place is not None:
         return _read_open(name, scope.context.globals, global_place, place)
 
@@ -74,13 +74,6 @@ def _read_open(name: str, variables: Frame, global_place: int, place: int) -> Fa
             if value is UNSET:
                 raise ScriptRuntimeError(f"the variable '{name}' has no value yet")
         return value
-
-    return Fast(read)
-
-
-def _undefined(name: str) -> Fast[Value]:
-    def read(_: Frame) -> Value:
-        raise ScriptRuntimeError(f"the name '{name}' is not defined; assign it first")
 
     return Fast(read)
 

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from sim_twin.controller.script.code import Builtins, Code, Signal, Slow
 from sim_twin.controller.script.context import Context, Scope
 from sim_twin.controller.script.errors import ScriptFault, ScriptRuntimeError
+from sim_twin.controller.script.names import check_names
 from sim_twin.controller.script.statements import compile_body, compile_routine
 from sim_twin.controller.script.syntax import Definition, Program
 from sim_twin.controller.script.threads import Meter, ProgramHalted, Scheduler, Steps
@@ -49,6 +50,9 @@ class Interpreter:
                 LookupError, ArithmeticError or ScriptRuntimeError that one raises ends the program.
             slice_budget: How many statements one thread may execute in one slice.
             variables: Global variables that exist before the program begins.
+
+        Raises:
+            ScriptNameError: the program uses a name that nothing has.
         """
         self.status = Status.RUNNING
         self.error: ScriptFault | None = None
@@ -56,6 +60,7 @@ class Interpreter:
         self._meter = Meter()
         may_take_time = not program.is_secondary
         self._scheduler = Scheduler(self._meter, slice_budget=slice_budget, may_take_time=may_take_time)
+        check_names(program, builtins=builtins, variables=variables or ())
         context = Context(
             program,
             builtins=builtins,

@@ -6,7 +6,7 @@ import msgspec
 
 from sim_twin.controller.script.errors import ScriptSyntaxError
 
-__all__ = ["KEYWORDS", "Token", "tokens_of"]
+__all__ = ["KEYWORDS", "Token", "line_at", "tokens_of"]
 
 KEYWORDS = frozenset(
     {"def", "sec", "thread", "end", "if", "elif", "else", "while", "break", "continue", "return", "global", "local"}
@@ -43,6 +43,12 @@ class Token(msgspec.Struct, frozen=True, gc=False):
     is_first: bool
 
 
+def line_at(text: str, offset: int) -> str:
+    """Return the line of a text that a place is on, without its end."""
+    end = text.find("\n", offset)
+    return text[text.rfind("\n", 0, offset) + 1 : len(text) if end < 0 else end].rstrip("\r")
+
+
 def tokens_of(text: str) -> list[Token]:
     """Cut a text into tokens, with one of kind "end of text" at the end.
 
@@ -66,6 +72,6 @@ def tokens_of(text: str) -> list[Token]:
     if at != len(text):
         expected = "the closing quote on the same line" if text[at] in "\"'" else "a name, number, string or operator"
         column = at - text.rfind("\n", 0, at)
-        raise ScriptSyntaxError(line=line, column=column, expected=expected, got=repr(text[at]))
+        raise ScriptSyntaxError(line=line, column=column, text=line_at(text, at), expected=expected, got=repr(text[at]))
     tokens.append(Token("end of text", "", at, line, True))
     return tokens

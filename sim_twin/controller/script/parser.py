@@ -94,7 +94,7 @@ class _Parser(ExpressionParser):
 
     def _scoped(self) -> Statement:
         token = self.advance()
-        target = Name(self.name("a variable's name"))
+        target = Name(self.name("a variable's name"), *self.place(self._tokens[self._at - 1]))
         if self.kind != "=":
             self.fail("'='")
         return self._assigned(token.line, token.kind, target)

@@ -43,9 +43,11 @@ class Constant(msgspec.Struct, frozen=True):
 
 
 class Name(msgspec.Struct, frozen=True):
-    """A variable."""
+    """A variable, and where it stands."""
 
     name: str
+    line: int
+    column: int
 
 
 class ListLiteral(msgspec.Struct, frozen=True):
@@ -115,6 +117,7 @@ class Call(msgspec.Struct, frozen=True):
     positional: "tuple[Expression, ...]"
     keywords: "tuple[tuple[str, Expression], ...]"
     line: int
+    column: int
 
 
 class MethodCall(msgspec.Struct, frozen=True):
@@ -126,9 +129,11 @@ class MethodCall(msgspec.Struct, frozen=True):
 
 
 class Run(msgspec.Struct, frozen=True):
-    """Run thread()."""
+    """Run thread(), and where its name stands."""
 
     name: str
+    line: int
+    column: int
 
 
 Expression: TypeAlias = (

@@ -1,7 +1,9 @@
 """Port 29999: one command a line, one line back, in UR's exact words.
 
-The words are those of UR's dashboard pages and of what public clients match on. In local control the commands that act
-are refused, and a connection that was made in local control stays refused: UR asks for a reconnect, so does this.
+The words are those of UR's dashboard pages and of what public clients match on. Where those pages know one reply to a
+command, it is given whether or not the arm follows: `power on` to an arm that runs is answered "Powering on" and
+changes nothing (Universal_Robots_Client_Library, pull request 397). In local control the commands that act are refused,
+and a connection that was made in local control stays refused: UR asks for a reconnect, so does this.
 """
 
 from collections.abc import Callable
@@ -142,23 +144,20 @@ def _truth(is_true: bool) -> str:
 
 
 def _power(target: DashboardTarget) -> dict[str, _Command]:
-    def act(words: str, do: Callable[[], Outcome], done: str) -> _Command:
-        return _Command(lambda _rest: _said(do(), done, f"Failed to execute: {words}"), is_acting=True)
+    def act(do: Callable[[], Outcome], said: str) -> _Command:
+        def answer(_rest: str) -> str:
+            return TOO_EARLY if do() is Outcome.TOO_EARLY else said
 
-    def unlock(_rest: str) -> str:
-        outcome = target.unlock_protective_stop()
-        if outcome is Outcome.TOO_EARLY:
-            return TOO_EARLY
-        return _said(outcome, "Protective stop releasing", "Failed to execute: unlock protective stop")
+        return _Command(answer, is_acting=True)
 
     return {
-        "power on": act("power on", target.power_on, "Powering on"),
-        "power off": act("power off", target.power_off, "Powering off"),
-        "brake release": act("brake release", target.brake_release, "Brake releasing"),
-        "unlock protective stop": _Command(unlock, is_acting=True),
-        "close safety popup": act("close safety popup", target.close_safety_popup, "closing safety popup"),
-        "restart safety": act("restart safety", target.restart_safety, "Restarting safety"),
-        "shutdown": act("shutdown", target.shutdown, "Shutting down"),
+        "power on": act(target.power_on, "Powering on"),
+        "power off": act(target.power_off, "Powering off"),
+        "brake release": act(target.brake_release, "Brake releasing"),
+        "unlock protective stop": act(target.unlock_protective_stop, "Protective stop releasing"),
+        "close safety popup": act(target.close_safety_popup, "closing safety popup"),
+        "restart safety": act(target.restart_safety, "Restarting safety"),
+        "shutdown": act(target.shutdown, "Shutting down"),
     }
 
 
@@ -185,8 +184,12 @@ def _programs(target: DashboardTarget) -> dict[str, _Command]:
 
 
 def _panel(target: DashboardTarget) -> dict[str, _Command]:
-    def say(words: str, do: Callable[[str], Outcome], done: str) -> _Command:
-        return _Command(lambda rest: _said(do(rest), done, f"Failed to execute: {words}"))
+    def say(do: Callable[[str], Outcome], said: str) -> _Command:
+        def answer(rest: str) -> str:
+            do(rest)
+            return said
+
+        return _Command(answer)
 
     def set_mode(rest: str) -> str:
         mode = rest.upper()
@@ -195,18 +198,17 @@ def _panel(target: DashboardTarget) -> dict[str, _Command]:
         return _said(outcome, f"Operational mode {mode} is set", f"Failed setting operational mode to {rest}")
 
     def clear_mode(_rest: str) -> str:
-        outcome = target.clear_operational_mode()
+        target.clear_operational_mode()
         mode = target.status().operational_mode
-        done = f"No longer controlling the operational mode. Current operational mode: '{mode}'."
-        return _said(outcome, done, "Failed to execute: clear operational mode")
+        return f"No longer controlling the operational mode. Current operational mode: '{mode}'."
 
     def set_role(rest: str) -> str:
         return _said(target.set_user_role(rest), f"Setting user role: {rest}", f"Failed setting user role: {rest}")
 
     return {
-        "popup": say("popup", target.popup, "showing popup"),
-        "close popup": say("close popup", lambda _rest: target.close_popup(), "closing popup"),
-        "addtolog": say("addToLog", target.add_to_log, "Added log message"),
+        "popup": say(target.popup, "showing popup"),
+        "close popup": say(lambda _rest: target.close_popup(), "closing popup"),
+        "addtolog": say(target.add_to_log, "Added log message"),
         "set operational mode": _Command(set_mode, is_acting=True),
         "clear operational mode": _Command(clear_mode, is_acting=True),
         "setuserrole": _Command(set_role, since=(None, (3, 1))),

@@ -1,6 +1,8 @@
 """`autotelic controller` as a process, and its faults from another."""
 
+import math
 import signal
+import socket
 import subprocess
 import sys
 import time
@@ -9,6 +11,7 @@ import pytest
 from typer.testing import CliRunner
 
 from sim_twin.controller.cli import app
+from sim_twin.controller.control_port import CONTROL
 from sim_twin.controller.process import ControllerProcess, ControllerProcessError, ask_fault
 from sim_twin.controller.server import Setup
 
@@ -53,17 +56,90 @@ def test_faults_come_by_the_command_line(process):
     assert result.exit_code == 0, result.output
     assert process.fault("truth")["safety_mode"] == "PROTECTIVE_STOP"
     assert CliRunner().invoke(app, ["fault", HOST, "nonsense"]).exit_code == 1
-    assert CliRunner().invoke(app, ["fault", HOST, "delay", "ms=x"]).exit_code == 1
+    assert CliRunner().invoke(app, ["fault", HOST, "delay", "ms=x"]).exit_code == 2
+    assert CliRunner().invoke(app, ["fault", HOST, "delay", "ms"]).exit_code == 2
+    assert CliRunner().invoke(app, ["fault", HOST, "truth", "name=1"]).exit_code == 1
     assert CliRunner().invoke(app, ["fault", "127.0.0.11", "truth"]).exit_code == 1
 
 
 @pytest.mark.parametrize(
     ("name", "numbers"),
-    [("delay", {"port": 1}), ("late", {"ms": -1}), ("bias", {"rad": [1]}), ("drop", {"no": 1}), ("push", {"nm": "x"})],
+    [
+        *[("delay", {"port": 1}), ("delay", {"ms": 1e9}), ("delay", {"ms": "5"}), ("late", {"ms": -1})],
+        *[("late", {"every": 1.5}), ("bias", {"rad": [1]}), ("bias", {"rad": [1e9] * 6}), ("drop", {"no": 1})],
+        *[
+            ("drop", {"port": [1]}),
+            ("push", {"nm": "x"}),
+            ("push", {"nm": [1e9, 0, 0, 0, 0, 0]}),
+            ("push", {"nm": [1]}),
+        ],
+        *[
+            ("inputs", {"bits": 1.5}),
+            ("inputs", {"bits": "x"}),
+            ("inputs", {"bits": -1}),
+            ("inputs", {"bits": 1 << 18}),
+        ],
+        *[("noise", {"rad": "x"}), ("noise", {"rad": -1}), ("payload", {"kg": "x"}), ("payload", {"kg": -1})],
+        *[
+            ("calibrate", {"mm": 1e9}),
+            ("calibrate", {"mrad": "x"}),
+            ("jog", {}),
+            ("jog", {"rad": [0, 0, 0, 0, 0, 1e6]}),
+        ],
+        *[("reserve", {"names": 3}), ("reserve", {"names": [[1]]}), ("reserve", {"names": ["no_such_field"]})],
+        *[("remote", {"on": "no"}), ("reduced", {"on": 3}), ("log", {"last": "x"}), ("log", {"last": 0})],
+        *[("ticks", {"clear": "x"}), ("truth", {"self": 1}), ("estop", {"on": True}), ("freeze", {"port": "30004"})],
+    ],
 )
 def test_a_fault_that_makes_no_sense_is_refused(process, name, numbers):
     with pytest.raises(ControllerProcessError, match=name):
         process.fault(name, **numbers)
+    assert process.is_alive
+
+
+@pytest.mark.parametrize("line", [b"[" * 60_000, b'{"fault": ' + b'{"a": ' * 9_000, b"\xff", b'{"fault": ["x"]}', b"1"])
+def test_a_line_that_is_no_fault_is_answered_with_an_error(process, line):
+    with socket.create_connection((HOST, CONTROL), timeout=5.0) as connection:
+        connection.sendall(line + b"\n")
+        assert b'"error"' in connection.makefile("rb").readline()
+    assert process.is_alive
+
+
+def test_the_greatest_faults_leave_the_controller_alive(process):
+    process.fault("calibrate", mm=100.0, mrad=100.0)
+    process.fault("inputs", bits=(1 << 18) - 1)
+    process.fault("noise", rad=0.5)
+    process.fault("push", nm=[300.0, -300.0, 300.0, 300.0, 300.0, 300.0])
+    time.sleep(0.2)
+    truth = process.fault("truth")
+    for name in ("calibrate", "inputs", "noise", "push"):
+        process.fault(name)
+    assert all(math.isfinite(q) for q in truth["q_rad"])
+    before = truth["n_slices"]
+    time.sleep(0.05)
+    assert process.fault("truth")["n_slices"] > before
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--version", "4294967296.1.1"], "version: expected"),
+        (["--version", "5.4294967296.1"], "version: expected"),
+        (["--version", "7.1.1"], "version: expected 3.x (CB3) or 5.x (e-Series)"),
+        (["--version", "10.7.0"], "PolyScope X"),
+        (["--version", "5.x"], "version: expected numbers"),
+        (["--bus", "nonsense"], "bus: expected an endpoint such as tcp/"),
+        (["--bus", 'tcp/"]'], "bus: expected"),
+        (["--host", "nonsense"], "nonsense"),
+        (["--scenario", "nonsense"], "scenarios: expected"),
+        (["--cell", "nonsense"], "cells: expected"),
+        (["--script", "/nonsense"], "/nonsense"),
+    ],
+)
+def test_a_wrong_argument_is_told_in_one_line(arguments, words):
+    result = CliRunner().invoke(app, ["--host", "127.0.0.66", *arguments])
+    assert (result.exit_code, result.output.count("\n")) == (2, 1), result.output
+    assert words in result.output
 
 
 def test_everything_can_stand_still_and_go_on(process):

@@ -1,6 +1,7 @@
 """The virtual robot without ports: slice by slice, the same every time."""
 
 import math
+import struct
 
 import msgspec
 import numpy as np
@@ -63,7 +64,40 @@ def test_a_text_that_does_not_parse_is_reported_and_harms_nothing():
     robot.submit_script("def f():\n if\nend\n")
     run(robot, 3)
     assert state_of(robot) is PLAYING
-    assert any("line 2" in line or "line 3" in line for line in lines(robot))
+    assert any("line 3, column 1: expected a value, got 'end'" in line for line in lines(robot))
+    assert robot.machine.journal.outbox[-1].endswith(b"syntax_error_on_line:3:end:")
+
+
+@pytest.mark.parametrize(
+    ("text", "name", "line", "column"),
+    [
+        ("def illegal_fun():\n  calldoesntexist()\nend", "calldoesntexist", 2, 3),
+        ("def f():\n movej([0, -1, 1, 0, 0, 0])\n foo(1)\nend\n", "foo", 3, 2),
+        ("def f():\n sync()\n if False:\n  foo(1)\n end\nend\n", "foo", 4, 3),
+        ("def f():\n def g():\n  return 1 + missing\n end\n sync()\nend\n", "missing", 3, 14),
+        ("def f():\n sync()\n h = run nobody()\nend\n", "nobody", 3, 10),
+        ("sec s():\n foo()\nend\n", "foo", 2, 2),
+    ],
+)
+def test_a_name_that_nothing_has_is_reported_with_its_place_and_nothing_starts(text, name, line, column):
+    robot = make_robot()
+    run(robot, 3)
+    before = robot.machine.world.data.qpos[:6].copy()
+    robot.submit_script(text)
+    run(robot, 200)
+    said = list(robot.machine.journal.outbox)
+    assert len(said) == 1
+    assert said[0].endswith(struct.pack(">II", line, column) + f"compile_error_name_not_found:{name}:".encode())
+    assert state_of(robot) is STOPPED
+    assert np.abs(robot.machine.world.data.qpos[:6] - before).max() < 1e-4
+    assert not any("STARTED" in line for line in lines(robot))
+
+
+def test_a_secondary_program_that_fails_says_so_as_a_robot_does():
+    robot = make_robot()
+    robot.submit_script("sec side():\n set_digital_out(99, True)\nend\n")
+    run(robot, 3)
+    assert b"SECONDARY_PROGRAM_EXCEPTION_XXXset_digital_out(): expected" in robot.machine.journal.outbox[-1]
 
 
 def test_a_def_replaces_and_a_sec_runs_beside():
@@ -145,6 +179,16 @@ def test_power_comes_up_through_the_dashboard():
     assert robot.panel.brake_release() is Outcome.DONE
     run(robot, 2000, lambda: robot.machine.modes.robot is RobotMode.RUNNING)
     assert robot.outputs["joint_mode"]() == (253,) * 6
+
+
+def test_power_and_brakes_asked_for_again_change_nothing():
+    robot = started(FOREVER)
+    robot.panel.power_on()
+    robot.panel.brake_release()
+    robot.panel.unlock_protective_stop()
+    run(robot, 10)
+    assert (state_of(robot), robot.machine.modes.robot) == (PLAYING, RobotMode.RUNNING)
+    assert robot.machine.modes.safety is SafetyMode.NORMAL
 
 
 def test_an_emergency_stop_takes_the_power_and_is_recovered_from_by_hand():

@@ -74,5 +74,5 @@ def test_a_jog_moves_the_joints_by_as_much(robot, faults):
     faults.apply("jog", rad=[0.1, 0, 0, 0, 0, -0.1])
     run(robot, 800)
     assert robot.machine.world.data.qpos[:6] - before == pytest.approx([0.1, 0, 0, 0, 0, -0.1], abs=2e-3)
-    with pytest.raises(FaultError, match="6 angles"):
+    with pytest.raises(FaultError, match="length 6"):
         faults.apply("jog", rad=[0.1])

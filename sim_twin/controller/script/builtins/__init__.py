@@ -5,7 +5,17 @@
 An argument that does not fit raises TypeError or ValueError; the interpreter adds the function's name and the line.
 """
 
-from sim_twin.controller.script.builtins.arguments import flag, integer, matrix, number, numbers, pose, text, values
+from sim_twin.controller.script.builtins.arguments import (
+    flag,
+    integer,
+    matrix,
+    number,
+    numbers,
+    pose,
+    text,
+    values,
+    vector,
+)
 from sim_twin.controller.script.builtins.connection import Connection
 from sim_twin.controller.script.builtins.lists import LISTS
 from sim_twin.controller.script.builtins.maths import MATHS
@@ -31,6 +41,7 @@ __all__ = [
     "text",
     "time_builtins",
     "values",
+    "vector",
 ]
 
 PURE: Builtins = {**MATHS, **LISTS, **POSES}

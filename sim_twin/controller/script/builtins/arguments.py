@@ -1,9 +1,11 @@
 """What a builtin may be handed. Each check says what was expected and what came; the call site adds the name."""
 
+import math
+
 from sim_twin.controller.pose import Pose
 from sim_twin.controller.script.values import Value, described
 
-__all__ = ["flag", "integer", "matrix", "number", "numbers", "pose", "text", "values"]
+__all__ = ["flag", "integer", "matrix", "number", "numbers", "pose", "text", "values", "vector"]
 
 
 def number(value: Value) -> float:
@@ -48,6 +50,14 @@ def numbers(value: Value) -> list[float]:
     if type(value) is Pose:
         return list(value)
     return [number(part) for part in values(value)]
+
+
+def vector(value: Value, n: int) -> list[float]:
+    """Take a list of so many finite numbers, or a pose's six."""
+    found = numbers(value)
+    if len(found) != n or not all(map(math.isfinite, found)):
+        raise ValueError(f"expected {n} finite numbers, got {described(value)}")
+    return found
 
 
 def matrix(value: Value) -> list[list[float]]:

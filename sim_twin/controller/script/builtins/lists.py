@@ -53,7 +53,11 @@ def _to_num(value: Value) -> Value:
     try:
         return int32(int(spelled))
     except ValueError:
+        pass
+    try:
         return float(spelled)
+    except ValueError:
+        raise ValueError(f"expected a string that spells a number, got {described(value)}") from None
 
 
 def _to_str(value: Value) -> Value:
@@ -67,7 +71,7 @@ def _str_cat(op1: Value, op2: Value) -> Value:
 def _str_at(src: Value, index: Value) -> Value:
     whole, i = text(src), integer(index)
     if not 0 <= i < len(whole):
-        raise IndexError(f"index {i} is out of range, expected 0 to {len(whole) - 1}")
+        raise IndexError(f"expected an index from 0 and below {len(whole)}, got {i}")
     return whole[i]
 
 
@@ -86,7 +90,7 @@ def _str_len(str_: Value) -> Value:
 def _str_sub(src: Value, index: Value, len_: Value = None) -> Value:
     whole, i = text(src), integer(index)
     if not 0 <= i <= len(whole):
-        raise IndexError(f"index {i} is out of range, expected 0 to {len(whole)}")
+        raise IndexError(f"expected an index from 0 to {len(whole)}, got {i}")
     n = len(whole) if len_ is None else integer(len_)
     if n < 0:
         raise ValueError(f"expected a length of at least 0, got {n}")

@@ -9,14 +9,18 @@ from sim_twin.controller.pose import Pose, pose_inv
 from sim_twin.controller.script.arithmetic import int32
 from sim_twin.controller.script.builtins.arguments import matrix, number, numbers
 from sim_twin.controller.script.code import Builtins
-from sim_twin.controller.script.values import Value
+from sim_twin.controller.script.values import Value, described
 
 __all__ = ["MATHS"]
 
 
-def _of_one(function: Callable[[float], float]) -> Callable[[Value], Value]:
+def _of_one(function: Callable[[float], float], domain: str = "a finite number") -> Callable[[Value], Value]:
     def apply(f: Value) -> Value:
-        return function(number(f))
+        given = number(f)
+        try:
+            return function(given)
+        except (ValueError, ArithmeticError):
+            raise ValueError(f"expected {domain}, got {described(f)}") from None
 
     return apply
 
@@ -26,20 +30,18 @@ def _atan2(x: Value, y: Value) -> Value:
     return math.atan2(number(x), number(y))
 
 
-def _floor(f: Value) -> Value:
-    return int32(math.floor(number(f)))
-
-
-def _ceil(f: Value) -> Value:
-    return int32(math.ceil(number(f)))
-
-
 def _log(b: Value, f: Value) -> Value:
-    return math.log(number(f)) / math.log(number(b))
+    base, given = number(b), number(f)
+    if not (base > 0 and base != 1 and given > 0):
+        raise ValueError(f"expected a base and a number above 0, the base not 1, got {described(b)}, {described(f)}")
+    return math.log(given) / math.log(base)
 
 
 def _pow(base: Value, exponent: Value) -> Value:
-    result = math.pow(number(base), number(exponent))
+    try:
+        result = math.pow(number(base), number(exponent))
+    except (ValueError, ArithmeticError):
+        raise ValueError(f"expected numbers that have a power, got {described(base)}, {described(exponent)}") from None
     is_whole = type(base) is int and type(exponent) is int and exponent >= 0 and abs(result) <= 0x7FFF_FFFF
     return int(result) if is_whole else result
 
@@ -73,14 +75,14 @@ def _size(v: Value) -> Value:
 
 
 MATHS: Builtins = {
-    "acos": _of_one(math.acos),
-    "asin": _of_one(math.asin),
+    "acos": _of_one(math.acos, "a number from -1 to 1"),
+    "asin": _of_one(math.asin, "a number from -1 to 1"),
     "atan": _of_one(math.atan),
     "atan2": _atan2,
-    "ceil": _ceil,
+    "ceil": _of_one(lambda f: int32(math.ceil(f))),
     "cos": _of_one(math.cos),
     "d2r": _of_one(math.radians),
-    "floor": _floor,
+    "floor": _of_one(lambda f: int32(math.floor(f))),
     "inv": _inv,
     "log": _log,
     "norm": _norm,
@@ -88,7 +90,7 @@ MATHS: Builtins = {
     "r2d": _of_one(math.degrees),
     "sin": _of_one(math.sin),
     "size": _size,
-    "sqrt": _of_one(math.sqrt),
+    "sqrt": _of_one(math.sqrt, "a number of 0 or more"),
     "tan": _of_one(math.tan),
     "transpose": _transpose,
 }

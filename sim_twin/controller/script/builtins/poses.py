@@ -1,7 +1,7 @@
 """The pose functions of `sim_twin.controller.pose` under their URScript names."""
 
 from sim_twin.controller import pose as poses
-from sim_twin.controller.script.builtins.arguments import number, numbers, pose
+from sim_twin.controller.script.builtins.arguments import number, pose, vector
 from sim_twin.controller.script.code import Builtins
 from sim_twin.controller.script.values import Value
 
@@ -37,22 +37,15 @@ def _interpolate_pose(p_from: Value, p_to: Value, alpha: Value) -> Value:
 
 
 def _rotvec2rpy(rotation_vector: Value) -> Value:
-    return list(poses.rpy_from_rotvec(_exactly(3, rotation_vector)))
+    return list(poses.rpy_from_rotvec(vector(rotation_vector, 3)))
 
 
 def _rpy2rotvec(rpy_vector: Value) -> Value:
-    return list(poses.rotvec_from_rpy(_exactly(3, rpy_vector)))
+    return list(poses.rotvec_from_rpy(vector(rpy_vector, 3)))
 
 
 def _wrench_trans(T_from_to: Value, w_from: Value) -> Value:
-    return list(poses.wrench_trans(pose(T_from_to), _exactly(6, w_from)))
-
-
-def _exactly(n: int, value: Value) -> list[float]:
-    found = numbers(value)
-    if len(found) != n:
-        raise ValueError(f"expected {n} numbers, got {len(found)}")
-    return found
+    return list(poses.wrench_trans(pose(T_from_to), vector(w_from, 6)))
 
 
 POSES: Builtins = {

@@ -10,6 +10,7 @@ import struct
 from collections.abc import Callable, Generator
 from typing import TypeAlias, TypeVar
 
+from sim_twin.controller.script.arithmetic import int32
 from sim_twin.controller.script.builtins.arguments import flag, integer, number, text
 from sim_twin.controller.script.builtins.connection import Connection
 from sim_twin.controller.script.builtins.waiting import slices_in
@@ -94,7 +95,7 @@ class Sockets:
         return self._send(bytes([integer(value) & 0xFF]), socket_name)
 
     def _send_int(self, value: Value, socket_name: Value = _FIRST) -> Value:
-        return self._send(struct.pack(">i", integer(value)), socket_name)
+        return self._send(struct.pack(">i", int32(integer(value))), socket_name)
 
     def _await(
         self, socket_name: Value, timeout_s: float, take: Callable[[Connection], T | None]

@@ -7,10 +7,7 @@ from tests.support.scripts import ScriptRun, error_of, program
 @pytest.mark.parametrize(
     ("statement", "says"),
     [
-        ("x = missing + 1", "'missing' is not defined"),
-        ("missing[0] = 1", "'missing' is not defined"),
         ("x = later\n later = 1", "'later' has no value yet"),
-        ("no_such_builtin(1)", "'no_such_builtin' is not defined"),
         ("x = [1, 2]\nx[2] = 0", "index 2 is out of range, expected 0 to 1"),
         ("x = [1, 2][-1]", "index -1 is out of range"),
         ('x = [1]["a"]', "expected an integer as index, got the string 'a'"),
@@ -23,13 +20,14 @@ from tests.support.scripts import ScriptRun, error_of, program
         ("x = struct(a=1)\ny = x.b", "no member 'b', it has a"),
         ("x = [1]\nx.shuffle()", "no method 'shuffle'"),
         ("x = [1]\nx.append()", "append() takes 1 arguments, got 0"),
-        ("sin()", "sin(): missing a required argument"),
-        ("sin(1, 2)", "sin(): too many positional arguments"),
-        ("sin(angle=1)", "sin(): "),
+        ("sin()", "sin() misses the argument 'f'"),
+        ("sin(1, 2)", "sin() takes 1 arguments, got 2"),
+        ("sin(angle=1)", "sin() has no parameter 'angle'"),
         ('sin("a")', "sin(): expected a number, got the string 'a'"),
-        ("sqrt(-1)", "sqrt(): math domain error"),
+        ("sqrt(-1)", "sqrt(): expected a number of 0 or more, got the integer -1"),
         ("sleep(True)", "sleep(): expected a number, got the bool True"),
-        ('fail(message="no tool")', "fail(): no tool"),
+        ('fail(message="expected a tool")', "fail(): expected a tool"),
+        ('fail(message="zip() argument 2 is longer")', "fail(): expected other arguments, got the string 'zip()"),
         ("def f(a):\n end\n f()", "f() misses the argument 'a'"),
         ("def f(a):\n end\n f(1, 2)", "f() takes 1 arguments, got 2"),
         ("def f(a):\n end\n f(1, a=2)", "f() got the argument 'a' twice"),
@@ -60,11 +58,11 @@ def test_the_line_is_that_of_the_statement():
 
 
 def test_the_line_of_a_condition_is_its_own():
-    assert error_of("def prog():\n if False:\n  note(1)\n elif missing:\n  note(2)\n end\nend")[1] == 4
+    assert error_of("def prog():\n if False:\n  note(1)\n elif 1 / 0:\n  note(2)\n end\nend")[1] == 4
 
 
 def test_after_a_call_the_line_is_the_callers_again():
-    text = "def prog():\n def f():\n  note(1)\n  return 1\n end\n x = f() + missing\nend"
+    text = "def prog():\n def f():\n  note(1)\n  return 1\n end\n x = f() / 0\nend"
     assert error_of(text)[1] == 6
 
 
@@ -75,10 +73,10 @@ def test_the_line_of_an_error_inside_a_function_is_inside():
 def test_a_builtin_that_fails_after_some_slices_fails_at_its_call():
     def lift(height):
         yield
-        raise ValueError(f"{height} m is too high")
+        raise ValueError(f"expected 3 m at most, got {height}")
 
     text = "def prog():\n note(1)\n lift(\n  9)\n note(2)\nend"
-    assert error_of(text, lift=lift) == ("lift(): 9 m is too high", 3)
+    assert error_of(text, lift=lift) == ("lift(): expected 3 m at most, got 9", 3)
 
 
 def test_a_thread_that_fails_ends_the_whole_program():
@@ -193,7 +191,7 @@ def test_the_line_after_a_wait_is_the_threads_own():
 
 
 def test_after_a_call_that_took_time_the_line_is_the_callers_again():
-    text = "def prog():\n def f():\n  sync()\n  return 1\n end\n x = f() + missing\nend"
+    text = "def prog():\n def f():\n  sync()\n  return 1\n end\n x = f() / 0\nend"
     assert error_of(text)[1] == 6
 
 

@@ -1,9 +1,10 @@
 """Programs made up at random: whatever they do, they run, end or fail with a line; nothing else ever comes out."""
 
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sim_twin.controller.script import Status
+from sim_twin.controller.script import ScriptNameError, Status
 from tests.support.scripts import ScriptRun, program
 
 names = st.sampled_from(["a", "b", "c", "p", "n"])
@@ -54,7 +55,13 @@ blocks = st.recursive(
 @settings(max_examples=300)
 @given(blocks, blocks, blocks)
 def test_a_program_runs_ends_or_fails_with_a_line(main, function, thread):
-    text = program(f"def f(a, b=2):\n{function}\nreturn a\nend\nthread t():\n{thread}\nend\na = [1, [2]]\n{main}")
+    head = "if False:\nb = 1\nc = 1\np = 1\nn = 1\ndef g():\nend\ndef h(b):\nend\nend\na = [1, [2]]"
+    text = program(f"def f(a, b=2):\n{function}\nreturn a\nend\nthread t():\n{thread}\nend\n{head}\n{main}")
+    if "unknown" in text:
+        with pytest.raises(ScriptNameError) as caught:
+            ScriptRun(text)
+        assert text.split("\n")[caught.value.line - 1][caught.value.column - 1 :].startswith("unknown")
+        return
     run = ScriptRun(text, slice_budget=200).step(6)
     status, error = run.interpreter.status, run.interpreter.error
     assert (error is not None) == (status is Status.FAILED)

@@ -150,13 +150,14 @@ def test_an_empty_text_is_an_empty_program():
 
 def test_the_tree_of_a_few_statements_by_hand():
     parsed = parse_program("x = 1 + y * 2\nf(a, b=p[1, 2, 3, 4, 5, 6])\nz = a or b or c and d")
-    product = Binary("*", Name("y"), Constant(2))
+    product = Binary("*", Name("y", 1, 9), Constant(2))
     six = PoseLiteral(tuple(Constant(i) for i in range(1, 7)))
-    chain = Logic("or", (Name("a"), Name("b"), Logic("and", (Name("c"), Name("d")))))
+    both = Logic("and", (Name("c", 3, 15), Name("d", 3, 21)))
+    chain = Logic("or", (Name("a", 3, 5), Name("b", 3, 10), both))
     assert parsed.body == (
-        Assign(1, "", Name("x"), Binary("+", Constant(1), product)),
-        Evaluate(2, Call("f", (Name("a"),), (("b", six),), 2)),
-        Assign(3, "", Name("z"), chain),
+        Assign(1, "", Name("x", 1, 1), Binary("+", Constant(1), product)),
+        Evaluate(2, Call("f", (Name("a", 2, 3),), (("b", six),), 2, 1)),
+        Assign(3, "", Name("z", 3, 1), chain),
     )
 
 
