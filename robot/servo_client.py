@@ -148,11 +148,13 @@ class ServoClient:
         """
         self._overhear()
         if not self._is_gone:
+            was_in_command = self._is_in_command
             try:
                 self._ask(Stop(), Done, ANSWER_S)
-            except WireError:
-                if self._process is not None:
-                    raise
+            except WireError as error:
+                self._is_in_command = False
+                if was_in_command:
+                    self._why_lost = str(error)
             else:
                 self._is_in_command = False
                 return
@@ -241,6 +243,7 @@ class ServoClient:
                 "was killed, the arm's own watchdog stops the arm"
             )
         if isinstance(reply, Failure):
+            self._is_leaving |= reply.is_end
             raise _error(reply)
         assert isinstance(reply, expected), f"{type(request).__name__} was answered by {type(reply).__name__}"
         return reply

@@ -1,6 +1,6 @@
 """A UR5e as a plant: the arm at the rig's address."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 from config.arm import ArmConfig
 from config.cell import CellConfig
@@ -49,6 +49,10 @@ class RtdePlant:
         self.cameras: Mapping[str, Camera] = {}
         self.truth: SceneTruth | None = None
         self.resetter: Resetter = _NoResetter()
+
+    def end_by(self, end: Callable[[], object]) -> None:
+        """Have this process ended by this, once the link is lost where nobody ticks."""
+        self.arm.when_lost = end
 
     @property
     def identity(self) -> PlantIdentity:

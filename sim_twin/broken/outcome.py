@@ -6,9 +6,8 @@ from sim_twin.broken.judge import Judged
 from sim_twin.broken.rider import Raised
 from sim_twin.broken.trials import JOG_RAD, Trial
 
-__all__ = ["NOTICED_S", "Outcome"]
+__all__ = ["Outcome"]
 
-NOTICED_S = 0.1
 STILL_RAD = 1e-3
 """Nothing that rests may move farther by itself."""
 REST_SLACK_S = 0.03
@@ -21,6 +20,8 @@ class Outcome(msgspec.Struct, frozen=True, kw_only=True):
     raised: Raised | None
     noticed_s: float | None
     stop: Judged | None
+    held: str | None
+    """Who held an arm whose link was lost, a while after; None where nobody did."""
     barred: str | None
     """What refused the arm while the fault lasted; None where nothing did, or nobody asked."""
     jogged_rad: float | None
@@ -31,13 +32,15 @@ class Outcome(msgspec.Struct, frozen=True, kw_only=True):
     again: Raised | None
     """What came up when it was moved again; None where it moved."""
 
-    def failures(self, *, noticed_s: float = NOTICED_S) -> tuple[str, ...]:
+    def failures(self, *, slack_s: float = 0.0) -> tuple[str, ...]:
         """Return what is not as asked, in words.
 
         Args:
-            noticed_s: how soon a fault must have been told; more where the machine is shared.
+            slack_s: how much later than asked a fault may be told where the machine is shared.
         """
-        wrong = list(self._wrong_stop(noticed_s)) if self.trial.is_stop else []
+        wrong = list(self._wrong_stop(self.trial.noticed_s + slack_s)) if self.trial.is_stop else []
+        if self.held is not None:
+            wrong.append(f"still held by {self.held}")
         if self.trial.bars and self.barred is None:
             wrong.append("the arm could be taken while the fault lasted")
         if self.jogged_rad is not None and not 0.9 * JOG_RAD < self.jogged_rad < 1.1 * JOG_RAD:

@@ -5,9 +5,9 @@ import pytest
 from sim_twin.broken import TRIALS, Course
 from sim_twin.broken.rider import DisturbedError
 
-NOTICED_S = 0.2
-"""Twice what is asked: the suite may share its processor."""
-ESSENTIAL = ("interfaces_frozen_1s", "servo_process_hung_and_jogged", "rtde_dropped")
+SLACK_S = 0.1
+"""So much later than asked: the suite may share its processor."""
+ESSENTIAL = ("interfaces_frozen_1s", "servo_process_hung_and_jogged", "rtde_dropped", "cut_during_stop")
 REASONS = {
     "link": "stale_state",
     "rtde": "stale_state",
@@ -31,7 +31,7 @@ def check(course, trial):
         outcome = course.run(trial)
     except DisturbedError as error:
         pytest.skip(f"this machine is too busy to hold an arm: {error}")
-    assert outcome.failures(noticed_s=NOTICED_S) == (), outcome.details()
+    assert outcome.failures(slack_s=SLACK_S) == (), outcome.details()
     expected = REASONS.get(trial.name.split("_")[0])
     if trial.is_stop and expected is not None:
         assert outcome.raised.what == expected
