@@ -211,7 +211,9 @@ class ServoClient:
             return
         try:
             if self._is_answer_due:
-                connection.close()  # a person broke in on a question: who finds the pipe closed stops the arm and ends
+                # A person broke in on a question: who is terminated, or finds the pipe closed, stops the arm and ends.
+                process.terminate()
+                connection.close()
             else:
                 self._ask(Close(), Done, ANSWER_S)
         except RobotError:
@@ -273,8 +275,8 @@ class ServoClient:
     def _how_it_ended(self) -> str:
         if self._watch is not None and self._watch.was_hung:
             return (
-                f"servo process: expected a tick at least every {1e3 * HUNG_S:.0f} ms, none came; it was killed, the "
-                "arm's own watchdog stops the arm"
+                "servo process: expected a tick every 2 ms, none came for 20 ms, or for "
+                f"{1e3 * HUNG_S:.0f} ms while it could not run; it was killed, the arm's own watchdog stops the arm"
             )
         return "servo process: expected an answer, it has ended; the arm's own watchdog stops the arm"
 
