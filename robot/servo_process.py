@@ -86,6 +86,8 @@ def serve(connection: Connection, resolved_json: bytes, pulse: MutableSequence[i
     server: ServoServer
 
     def die() -> None:
+        if isinstance(plant, Linked):
+            plant.abandon()
         os._exit(LOST_CODE)
 
     if isinstance(plant, Linked):
@@ -121,6 +123,7 @@ def serve(connection: Connection, resolved_json: bytes, pulse: MutableSequence[i
     except SystemExit:
         code = EXIT_TERMINATED
     finally:
+        signal.signal(signal.SIGTERM, signal.SIG_IGN)
         pulse[0] = NOT_TICKING  # stopping takes longer than a process may go without a tick while it ticks
         connection.close()  # first: the station is to know at once that nobody answers any more
         loop.close()

@@ -77,7 +77,9 @@ class Arm(Protocol):
         ...
 
     def stop(self) -> bool:
-        """Stop and hold the grip; return whether the plant confirmed. Idempotent, never raises.
+        """Stop arm and fingers; return whether the plant confirmed. Idempotent, never raises.
+
+        A hand that holds something goes on holding it, with the force that it has.
 
         Where it did not confirm nobody may speak to the arm again: the process that holds it must end.
         """
@@ -123,4 +125,8 @@ class Linked(Protocol):
 
     def end_by(self, end: Callable[[], object]) -> None:
         """Have this process ended by `end`, called from any thread, once the link is lost where nobody ticks."""
+        ...
+
+    def abandon(self) -> None:
+        """Stop what may still be spoken to, before this process ends. From any thread; never raises."""
         ...

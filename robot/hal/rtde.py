@@ -8,7 +8,7 @@ stop, for any word to it may make it reconnect: the controller's watchdog stops 
 guard sees to that where nobody ticks: between engaging and the first command, and while the arm is stopped.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from time import monotonic_ns
 
@@ -18,14 +18,13 @@ from rtde_receive import RTDEReceiveInterface
 
 from config.arm import ArmConfig
 from config.cell import CellConfig
-from robot.errors import NotEngagedError, StaleStateError, WireError
+from robot.errors import ArmRefusedError, NotEngagedError, StaleStateError, WireError
 from robot.geometry import quat_of_rotation_vector
-from robot.hal.link_guard import LinkGuard
-from robot.hal.link_watch import LinkWatch
 from robot.hal.pins import Pins
 from robot.hal.protocols import Clock
 from robot.hal.robotiq import GripScale, RobotiqGripper
 from robot.hal.rtde_clock import RtdeClock
+from robot.hal.rtde_links import RtdeLinks
 from robot.hal.rtde_outputs import N_OUTPUTS, DigitalOutputs
 from robot.hal.rtde_set_up import (
     arm_watchdog,
@@ -38,8 +37,8 @@ from robot.hal.rtde_set_up import (
 from robot.hal.ur_calls import bounded, named
 from robot.hal.ur_checks import check_facts, check_pose, check_serial
 from robot.hal.ur_primary import read_facts
-from robot.hal.ur_state import Runtime, UrStatus, check_ready, check_version, mode_of, parse_version
-from robot.messages import ArmCommand, ArmSpec, ArmState, GripState, Vec6
+from robot.hal.ur_state import Runtime, UrStatus, check_ready, check_version, mode_of, parse_version, why_refused
+from robot.messages import ArmCommand, ArmMode, ArmSpec, ArmState, GripState, Vec6
 
 __all__ = ["RtdeArm"]
 
@@ -52,7 +51,6 @@ FIELDS = (
 """All that is read here. Left to itself the client asks for 58 and more, which the controller would pack, and a thread
 beside the servo loop unpack, 500 times a second."""
 STALE_NS, HAND_NS = 50_000_000, 40_000_000
-RTDE_PORT = 30004
 WRITE_NS = 35_000_000
 """A command that took longer was no mere sending: the client may have reconnected in it, which takes 40 ms at least."""
 STOP_RAD_S2, REST_S, STILL_RAD_S = 10.0, 1.0, 0.01
@@ -94,12 +92,8 @@ class RtdeArm:
         self._gripper = RobotiqGripper(GripScale.of(arm.tool))
         self._last_timestamp, self._seen_ns, self._polled_ns = -1.0, 0, 0
         self._pins = Pins(cell)
-        self._links = LinkWatch(address, RTDE_PORT)
-        self._guard: LinkGuard | None = None
-        self._is_lost = False
-        self.when_lost: Callable[[], object] | None = None
-        """Called from a thread once the link is lost where nobody ticks; ends this process. None where it may not end:
-        then the client goes on by itself."""
+        self.links = RtdeLinks(address)
+        """Who may end this process is set on them."""
         self._runtime = Runtime.STOPPED
         """As the last state read told."""
 
@@ -135,12 +129,14 @@ class RtdeArm:
     def engage(self) -> None:
         """Take command of the arm, unless it is ours already. Nothing moves yet but a hand that needs activating.
 
+        That hand is waited for, some seconds.
+
         Raises:
             ArmRefusedError: the arm is not ready, or belongs to somebody else, or its watchdog does not work.
             StaleStateError: this process lost its link, before or now.
             WireError: somebody does not answer.
         """
-        if self._is_lost:
+        if self.links.is_lost:
             raise StaleStateError("arm: expected a process that never lost its link; end this one and start another")
         if self._control is not None:
             return
@@ -148,6 +144,10 @@ class RtdeArm:
         with named("dashboard", self.address):
             is_remote = bool(dashboard.isInRemoteControl())
         check_ready(self.status(), is_remote=is_remote)
+        self.read()
+        if not self._gripper.is_active:
+            self._gripper.activate(self._see_running)
+            check_ready(self.status(), is_remote=is_remote)  # somebody may have begun something meanwhile
         try:
             with named("RTDE control", self.address):
                 self._take_command(receive)
@@ -207,7 +207,7 @@ class RtdeArm:
         )  # fmt: skip
         spent_ns = monotonic_ns() - begun_ns
         if spent_ns > WRITE_NS:
-            self._is_lost = True
+            self.links.is_lost = True
             raise StaleStateError(
                 f"servoJ: expected it sent within {WRITE_NS / 1e6:g} ms, it took {spent_ns / 1e6:.0f} ms; the client "
                 "may have reconnected by itself"
@@ -220,22 +220,29 @@ class RtdeArm:
         self._require(untaken is None, f"digital output {untaken}")
 
     def stop(self) -> bool:
-        """Bring the arm to rest and give up command; the hand keeps its grip.
+        """Bring arm and fingers to rest and give up command; a hand that holds something goes on holding it.
 
-        Where the link was lost nothing is sent: the controller's watchdog stops the arm.
+        An activation under way is taken back. Where the link was lost nothing is sent to the arm: the controller's
+        watchdog stops it.
 
         Returns:
             Whether rest was seen, and that the program has ended. Where not, this process must end.
         """
-        if self._is_lost_now():
+        self.abandon()
+        if self.links.is_lost_now:
             return False
         if self._control is not None:
             with suppress(RuntimeError):
                 self._control.servoStop(STOP_RAD_S2)
         is_resting = self._wait_rest()
-        if self._is_lost_now():
+        if self.links.is_lost_now:
             return False
         return self._drop_control() and is_resting
+
+    def abandon(self) -> None:
+        """Stop the fingers: their wire is another than the arm's, and may be spoken on whatever became of that one."""
+        with suppress(WireError):
+            self._gripper.halt()
 
     def close(self) -> None:
         """Stop, and close every client. Idempotent, never raises."""
@@ -257,13 +264,7 @@ class RtdeArm:
     # -------------------------------------------------------------------------------------------------------- inside
 
     def _require_link(self) -> None:
-        """Raise StaleStateError where the controller hung up, before the client finds out and reconnects."""
-        if self._is_lost_now():
-            raise StaleStateError("arm: expected its link to stand, it was cut; whoever wants to move begins anew")
-
-    def _is_lost_now(self) -> bool:
-        self._is_lost |= self._links.is_cut()
-        return self._is_lost
+        self.links.require()
 
     def _reading(self) -> tuple[RTDEReceiveInterface, DashboardClient]:
         if self._receive is None or self._dashboard is None:
@@ -277,7 +278,7 @@ class RtdeArm:
             self._last_timestamp, self._seen_ns = timestamp, now_ns
         elif now_ns - self._seen_ns > STALE_NS:
             age_ms = (now_ns - self._seen_ns) / 1e6
-            self._is_lost |= self._control is not None
+            self.links.is_lost |= self._control is not None
             raise StaleStateError(
                 f"arm: expected a state every 2 ms, the newest is {age_ms:.0f} ms old; is the link up?"
             )
@@ -304,45 +305,37 @@ class RtdeArm:
             else:
                 return
 
+    def _see_running(self) -> None:
+        """Wait a tick and look at arm and hand; where the arm may not move the hand may not either."""
+        self.clock.wait_tick()
+        if self.read().mode is not ArmMode.RUNNING:
+            raise ArmRefusedError(f"hand: its activation was broken off: {why_refused(self.status())}")
+
     def _take_command(self, receive: RTDEReceiveInterface) -> None:
-        self._look()
-        if self.when_lost is not None:
-            self._guard = LinkGuard(self._links, timestamp_s=receive.getTimestamp, when_lost=self.when_lost)
-            self._guard.begin()
+        self.links.look()
+        self.links.begin_guard(receive.getTimestamp)
         self._control = self._take_control()
         prove_watchdog(self._control, receive, self.clock)
         self._require_link()
-        self._links.forget()  # before the client goes and its connection with it
+        self.links.pause()
         self._control = None
-        self._look()
+        self.links.look()
         self._control = self._take_control()
         self._set_up(self._control, receive)
         self._require_link()
 
-    def _look(self, n_more: int = 1) -> None:
-        """Watch what was connected since the last look.
-
-        Raises:
-            StaleStateError: it is connected no more.
-        """
-        n_watched = self._links.n_watched
-        self._is_lost |= self._links.look() < n_watched + n_more
-        self._require_link()
-
     def _take_control(self) -> RTDEControlInterface:
-        with bounded(TAKE_S if self.when_lost is not None else None):
+        with bounded(TAKE_S if self.links.when_lost is not None else None):
             control = RTDEControlInterface(self.address, RATE_HZ, RTDEControlInterface.FLAG_UPLOAD_SCRIPT)
-        self._look()
+        self.links.look()
         return control
 
     def _set_up(self, control: RTDEControlInterface, receive: RTDEReceiveInterface) -> None:
-        """Set payload and tool centre point, open the outputs and the hand, arm the watchdog last."""
+        """Set payload and tool centre point, open the outputs, arm the watchdog last."""
         set_tool(control, receive, self.clock, self._arm.tool)
         self._outputs = DigitalOutputs(self.address, bits=receive.getActualDigitalOutputBits() & _ALL_BITS)
-        self._look()
+        self.links.look()
         self._pins.forget()
-        if not self._gripper.is_active:
-            self._gripper.activate()
         arm_watchdog(control, receive, self.clock)  # from here on somebody must write
 
     def _drop_control(self, *, is_in_traceback: bool = False) -> bool:
@@ -362,11 +355,9 @@ class RtdeArm:
         if outputs is not None:
             with suppress(RuntimeError):
                 outputs.put(self._pins.rested(outputs.bits))
-        if self._is_lost_now():
+        if self.links.is_lost_now:
             return False
-        if self._guard is not None:
-            self._guard.end()
-        self._links.forget()
+        self.links.forget()
         if outputs is not None:
             outputs.close()
         control, self._control = self._control, None
@@ -379,18 +370,17 @@ class RtdeArm:
         require(is_taken, what, receive=self._reading()[0], clock=self.clock)
 
     def _wait_rest(self) -> bool:
-        """Wait until the joints rest, at most REST_S. Returns whether they do."""
-        if self._receive is None:
+        """Wait until the joints rest, at most REST_S, whatever the hand says. Returns whether they do."""
+        receive, deadline_ns = self._receive, monotonic_ns() + round(REST_S * 1e9)
+        if receive is None:
             return True
-        deadline_ns = monotonic_ns() + round(REST_S * 1e9)
-        while monotonic_ns() < deadline_ns:
-            try:
-                state = self.read()
+        with suppress(WireError, RuntimeError):  # the client throws the latter where it has no state
+            while monotonic_ns() < deadline_ns:
+                self._require_link()
+                self._note_freshness(receive)
                 self.clock.wait_tick()
-            except (WireError, RuntimeError):  # the client throws the latter where it has no state
-                return False
-            if max(abs(v) for v in state.qd_rad_s) < STILL_RAD_S:
-                return True
+                if max(abs(v) for v in receive.getActualQd()) < STILL_RAD_S:
+                    return True
         return False
 
 

@@ -52,7 +52,11 @@ class RtdePlant:
 
     def end_by(self, end: Callable[[], object]) -> None:
         """Have this process ended by this, once the link is lost where nobody ticks."""
-        self.arm.when_lost = end
+        self.arm.links.when_lost = end
+
+    def abandon(self) -> None:
+        """Stop the fingers, before this process ends."""
+        self.arm.abandon()
 
     @property
     def identity(self) -> PlantIdentity:

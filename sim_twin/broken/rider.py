@@ -142,7 +142,8 @@ class Rider:
 
     def engage_into(self, inject: Callable[[], float]) -> tuple[float, Raised | None]:
         """Let something go wrong while command is being taken; the same is returned."""
-        self.client.connect()
+        self.take()  # the hand is activated by then, which would take its time
+        self.client.stop()
         return _beside(inject, 0.2, self._engage)
 
     def seed_into(self, inject: Callable[[], float]) -> tuple[float, Raised | None]:
