@@ -148,11 +148,13 @@ class ServoClient:
         """
         self._overhear()
         if not self._is_gone:
+            was_in_command = self._is_in_command
             try:
                 self._ask(Stop(), Done, ANSWER_S)
-            except WireError:
-                if self._process is not None:
-                    raise
+            except WireError as error:
+                self._is_in_command = False
+                if was_in_command:
+                    self._why_lost = str(error)
             else:
                 self._is_in_command = False
                 return
@@ -209,7 +211,9 @@ class ServoClient:
             return
         try:
             if self._is_answer_due:
-                connection.close()  # a person broke in on a question: who finds the pipe closed stops the arm and ends
+                # A person broke in on a question: who is terminated, or finds the pipe closed, stops the arm and ends.
+                process.terminate()
+                connection.close()
             else:
                 self._ask(Close(), Done, ANSWER_S)
         except RobotError:
@@ -241,6 +245,7 @@ class ServoClient:
                 "was killed, the arm's own watchdog stops the arm"
             )
         if isinstance(reply, Failure):
+            self._is_leaving |= reply.is_end
             raise _error(reply)
         assert isinstance(reply, expected), f"{type(request).__name__} was answered by {type(reply).__name__}"
         return reply
@@ -270,8 +275,8 @@ class ServoClient:
     def _how_it_ended(self) -> str:
         if self._watch is not None and self._watch.was_hung:
             return (
-                f"servo process: expected a tick at least every {1e3 * HUNG_S:.0f} ms, none came; it was killed, the "
-                "arm's own watchdog stops the arm"
+                "servo process: expected a tick every 2 ms, none came for 20 ms, or for "
+                f"{1e3 * HUNG_S:.0f} ms while it could not run; it was killed, the arm's own watchdog stops the arm"
             )
         return "servo process: expected an answer, it has ended; the arm's own watchdog stops the arm"
 

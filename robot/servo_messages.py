@@ -107,6 +107,8 @@ class Failure(_Tagged, frozen=True, kw_only=True):
 
     kind: str
     message: str
+    is_end: bool = False
+    """Nothing is known of the arm any more: the process ends."""
 
 
 Reply = Connected | Seeded | Outputs | StrideReply | Done | Failure

@@ -6,9 +6,10 @@ an intent may be, the arm is brought to rest and held there. So the controller's
 the gate, and by nothing else.
 
 When the pipe to its station closes it stops the arm and ends. After a loss of the arm it ends too, at once where
-nothing is known of the arm any more: the client library must never get the chance to reconnect and go on by itself.
-What latched is told before the arm is stopped, for a stop takes its time. Ctrl-C at the terminal is the station's to
-decide on: this process is in a group of its own, so that it does not vanish from under an epoch that is to be finished.
+nothing is known of the arm any more, whatever it was about, or where a stop was not confirmed: the client library must
+never get the chance to reconnect and go on by itself. What latched is told before the arm is stopped, for a stop takes
+its time. Ctrl-C at the terminal is the station's to decide on: this process is in a group of its own, so that it does
+not vanish from under an epoch that is to be finished.
 """
 
 import gc
@@ -22,8 +23,8 @@ import msgspec
 
 from config.arm import ArmConfig
 from config.resolved import Resolved
-from robot.errors import RobotError, SafetyError
-from robot.hal.protocols import Plant
+from robot.errors import RobotError, SafetyError, WireError
+from robot.hal.protocols import Linked, Plant
 from robot.messages import ArmState, GripCommand, Verdict
 from robot.rigs import build_plant
 from robot.safety import Reason
@@ -59,6 +60,10 @@ LOST = Reason.STALE_STATE.value
 ENDING_REASONS = (LOST, Reason.ARM_REFUSED.value, Reason.WIRE.value)
 """After these the process ends."""
 LOST_CODE = 3
+NOT_STOPPED = (
+    "stop: expected the arm at rest and its program ended, nobody confirms it; its servo process has ended, look at "
+    "the arm and at its pendant"
+)
 EXIT_TERMINATED = 143
 NOT_TICKING = 0
 
@@ -71,13 +76,22 @@ def serve(connection: Connection, resolved_json: bytes, pulse: MutableSequence[i
         resolved_json: everything the rig is made of.
         pulse: shared memory of one number: ticks so far while it ticks, otherwise 0.
 
-    SIGTERM stops the arm and ends it too.
+    SIGTERM stops the arm and ends it too. It does not return: ruckig's binding would tell of some thirty leaks at the
+    interpreter's end, over what a person is to read.
     """
     os.setpgrp()
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(EXIT_TERMINATED))
     resolved = msgspec.json.decode(resolved_json, type=Resolved)
     plant = build_plant(rig=resolved.rig, arm=resolved.arm, scenario=resolved.scenario, cell=resolved.cell)
     server: ServoServer
+
+    def die() -> None:
+        if isinstance(plant, Linked):
+            plant.abandon()
+        os._exit(LOST_CODE)
+
+    if isinstance(plant, Linked):
+        plant.end_by(die)
 
     def latched(verdict: Verdict) -> None:
         server.latched(verdict)
@@ -96,19 +110,26 @@ def serve(connection: Connection, resolved_json: bytes, pulse: MutableSequence[i
         loop=loop,
         arm=resolved.arm,
         pulse=pulse,
-        die=lambda: os._exit(LOST_CODE),
+        die=die,
     )
     # What is there by now stays: no collection in the midst of the ticks need look through it again.
     gc.collect()
     gc.freeze()
+    code = 0
     try:
         server.run()
     except (EOFError, OSError, KeyboardInterrupt):
         pass  # the station is gone; the arm is stopped below
+    except SystemExit:
+        code = EXIT_TERMINATED
     finally:
+        signal.signal(signal.SIGTERM, signal.SIG_IGN)
         pulse[0] = NOT_TICKING  # stopping takes longer than a process may go without a tick while it ticks
         connection.close()  # first: the station is to know at once that nobody answers any more
         loop.close()
+    sys.stdout.flush()
+    sys.stderr.flush()
+    os._exit(code)
 
 
 class ServoServer:
@@ -169,6 +190,7 @@ class ServoServer:
         assert self._grip is not None, "seeding sets it"
         verdict = self._loop.tick(self._grip)
         if verdict is not None:
+            self._end_unless_stopped()
             return
         self._n_ticks += 1
         self._pulse[0] = self._n_ticks
@@ -190,8 +212,11 @@ class ServoServer:
         try:
             reply = self._obey(request)
         except RobotError as error:
-            reply = Failure(kind=type(error).__name__, message=str(error))
+            is_end = isinstance(error, WireError) and not isinstance(error, SafetyError)
+            reply = Failure(kind=type(error).__name__, message=str(error), is_end=is_end)
         self._send(reply)
+        if isinstance(reply, Failure) and reply.is_end:
+            self._die()
 
     def _begin_stride(self, request: StrideRequest) -> None:
         n_ticks = request.n_ticks
@@ -210,6 +235,13 @@ class ServoServer:
         if verdict is None:
             self._n_left = max(n_ticks - self._n_over, n_ticks - n_ticks // 2)
             self._intent_ns, self._is_resting = self._now_ns(), False
+        else:
+            self._end_unless_stopped()
+
+    def _end_unless_stopped(self) -> None:
+        """End at once after a latch whose stop was not confirmed."""
+        if not self._loop.is_stop_confirmed:
+            self._die()
 
     def _obey(self, request: Request) -> Reply:
         match request:
@@ -224,7 +256,8 @@ class ServoServer:
                 return Outputs(bits=self._loop.begin_epoch(epoch))
             case Stop():
                 self._is_in_command = False
-                self._plant.arm.stop()
+                if not self._plant.arm.stop():
+                    raise WireError(NOT_STOPPED)
             case Close():
                 self._is_over = True
             case StrideRequest():

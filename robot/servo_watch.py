@@ -2,16 +2,40 @@
 
 import os
 import signal
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
+from pathlib import Path
 from threading import Event, Thread
 
-__all__ = ["HUNG_S", "ServoWatch"]
+__all__ = ["HUNG_S", "Patience", "ServoWatch"]
 
 LOOK_S = 0.005
-N_LOOKS = 12
+N_ASLEEP, N_LOOKS = 4, 12
 HUNG_S = LOOK_S * N_LOOKS
-"""Without a tick for so long a process counts as hung. The controller's own watchdog stops the arm after 100 ms."""
+"""Without a tick for so long a process counts as hung, and for 20 ms where it did not even want to run: it waits for
+something inside the client, which may be reconnecting. The controller's own watchdog stops the arm after 100 ms."""
+RUNNABLE = "R"
+
+
+class Patience:
+    """Counts looks at a pulse that stands still. One that is kept from running by others is given longer."""
+
+    def __init__(self) -> None:
+        self._last = self._n_same = self._n_asleep = 0
+
+    def is_over(self, pulse: int, *, is_asleep: Callable[[], bool]) -> bool:
+        """Return whether the process hangs.
+
+        Args:
+            pulse: its ticks so far while it ticks, otherwise 0.
+            is_asleep: whether it waits for something else than a processor; asked only where the pulse stands still.
+        """
+        if not pulse or pulse != self._last:
+            self._last, self._n_same, self._n_asleep = pulse, 0, 0
+            return False
+        self._n_same += 1
+        self._n_asleep += is_asleep()
+        return self._n_asleep >= N_ASLEEP or self._n_same >= N_LOOKS
 
 
 class ServoWatch:
@@ -29,6 +53,7 @@ class ServoWatch:
 
     def __init__(self, pid: int, pulse: Sequence[int]) -> None:
         self._pulse = pulse
+        self._stat = Path(f"/proc/{pid}/stat")
         self._process = os.pidfd_open(pid)
         self._is_over = Event()
         self.was_hung = False
@@ -43,13 +68,16 @@ class ServoWatch:
             os.close(self._process)
 
     def _run(self) -> None:
-        last, n_same = 0, 0
+        patience = Patience()
         while not self._is_over.wait(LOOK_S):
-            now = self._pulse[0]
-            n_same = n_same + 1 if now and now == last else 0
-            last = now
-            if n_same >= N_LOOKS:
+            if patience.is_over(self._pulse[0], is_asleep=self._is_asleep):
                 self.was_hung = True
                 with suppress(ProcessLookupError):
                     signal.pidfd_send_signal(self._process, signal.SIGKILL)
                 return
+
+    def _is_asleep(self) -> bool:
+        try:
+            return self._stat.read_text().rpartition(")")[2].split()[0] != RUNNABLE
+        except (OSError, IndexError):
+            return False  # it ended

@@ -102,6 +102,11 @@ class TickLoop:
         """Stop the arm; it must be seeded again before anything moves."""
         self._arm.stop()
 
+    @property
+    def is_stop_confirmed(self) -> bool:
+        """Whether the plant confirmed the stop of the last refusal."""
+        return self._gate.is_stop_confirmed
+
     def close(self) -> None:
         """Stop and release the arm. Idempotent, never raises."""
         self._arm.stop()

@@ -211,9 +211,11 @@ class TwinArm:
         world.digital_out = command.digital_out
 
     def stop(self) -> bool:
-        """Hold where the arm is; the hand keeps its force."""
+        """Hold where the arm is; a hand that holds something keeps its force, other fingers stand."""
         world = self._world
         world.begin_stop()
+        if not self._read_grip().has_object:
+            world.opening_goal_m = world.opening_asked_m
         return True
 
     def close(self) -> None:

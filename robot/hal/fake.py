@@ -107,7 +107,6 @@ class FakeArm:
         if self.is_silent:
             raise StaleStateError("fake arm: expected a state each tick, none came; it was silenced")
         q = _vec6(self._q)
-        held = self.held_opening_m
         return ArmState(
             stamp_ns=self.clock.now_ns(),
             q_rad=q,
@@ -118,12 +117,17 @@ class FakeArm:
             grip=GripState(
                 opening_m=self._opening_m,
                 is_moving=abs(self._opening_m - self._opening_before_m) > STILL_M,
-                has_object=held is not None and self._opening_goal_m < held and self._opening_m <= held,
+                has_object=self._has_object,
             ),
             digital_in=self.digital_in,
             digital_out=self._digital_out,
             mode=self.mode,
         )
+
+    @property
+    def _has_object(self) -> bool:
+        held = self.held_opening_m
+        return held is not None and self._opening_goal_m < held and self._opening_m <= held
 
     def write(self, command: ArmCommand) -> None:
         """Take targets for joints, hand and outputs."""
@@ -136,8 +140,10 @@ class FakeArm:
         self._digital_out = command.digital_out
 
     def stop(self) -> bool:
-        """Hold where the arm is; the hand keeps its grip."""
+        """Hold where the arm is; fingers that hold nothing stand."""
         self._target = list(self._q)
+        if not self._has_object:
+            self._opening_goal_m = self._opening_m
         self.n_stops += 1
         return True
 

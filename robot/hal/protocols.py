@@ -1,11 +1,11 @@
 """The doors to a world: Plant, Arm, Camera, truth, resetter. Consumers own these; implementations do not inherit."""
 
-from collections.abc import Mapping
-from typing import Protocol
+from collections.abc import Callable, Mapping
+from typing import Protocol, runtime_checkable
 
 from robot.messages import ArmCommand, ArmSpec, ArmState, PlantIdentity, SceneState
 
-__all__ = ["Arm", "Camera", "Clock", "Frame", "Plant", "Resetter", "SceneTruth"]
+__all__ = ["Arm", "Camera", "Clock", "Frame", "Linked", "Plant", "Resetter", "SceneTruth"]
 
 
 class Clock(Protocol):
@@ -77,7 +77,12 @@ class Arm(Protocol):
         ...
 
     def stop(self) -> bool:
-        """Stop and hold the grip; return whether the plant confirmed. Idempotent, never raises."""
+        """Stop arm and fingers; return whether the plant confirmed. Idempotent, never raises.
+
+        A hand that holds something goes on holding it, with the force that it has.
+
+        Where it did not confirm nobody may speak to the arm again: the process that holds it must end.
+        """
         ...
 
     def close(self) -> None:
@@ -111,4 +116,17 @@ class Plant(Protocol):
     @property
     def resetter(self) -> Resetter:
         """What lays the table out."""
+        ...
+
+
+@runtime_checkable
+class Linked(Protocol):
+    """A plant whose client would go on by itself after a loss of its link: the process that holds it has to end."""
+
+    def end_by(self, end: Callable[[], object]) -> None:
+        """Have this process ended by `end`, called from any thread, once the link is lost where nobody ticks."""
+        ...
+
+    def abandon(self) -> None:
+        """Stop what may still be spoken to, before this process ends. From any thread; never raises."""
         ...

@@ -5,6 +5,8 @@ The port and its commands are those that the URCap opens on the controller: ``GE
 """
 
 import socket
+from collections.abc import Callable
+from time import monotonic_ns
 
 import msgspec
 
@@ -17,13 +19,23 @@ __all__ = ["GRIPPER_PORT", "GripScale", "RobotiqGripper"]
 GRIPPER_PORT = 63352
 FULL = 255
 ACKNOWLEDGED = "ack"
-HELD_WHILE_CLOSING = 2
+HELD_WHILE_OPENING, HELD_WHILE_CLOSING = 1, 2
 """OBJ: 0 under way, 1 stopped while opening, 2 stopped while closing, 3 at the place asked for."""
 MOVING = 0
-READY = 3
+RESET, READY = 0, 3
 """STA: 0 reset, 1 activating, 3 active."""
 ASK_EVERY = 8
 """Polls from question to question: at 500 of them a second a hand is seen every 16 ms."""
+NO_VALUE = "?"
+"""What the port answers for a gripper that it does not hear: without power, mostly."""
+DEAF_LIMIT = 25
+ACTIVATE_S = 8.0
+"""How long resetting and both strokes may take; the maker's manual gives no bound."""
+_FAULTS = {
+    5: "it was to move before its activation was over", 7: "it was to move before its activation",
+    8: "too hot", 9: "no communication", 10: "too little voltage", 11: "automatic release under way",
+    12: "internal fault", 13: "activation failed", 14: "too much current", 15: "automatic release done",
+}  # fmt: skip
 SILENT_LIMIT = 200
 """Polls without an answer after which the gripper counts as gone."""
 
@@ -74,7 +86,8 @@ class RobotiqGripper:
         self._grip: GripCommand | None = None
         self._asked: tuple[int, int, int] | None = None
         self._is_query_out = False
-        self._n_silent, self._n_since_asked = 0, ASK_EVERY
+        self._n_silent, self._n_deaf, self._n_since_asked = 0, 0, ASK_EVERY
+        self._is_watched = self._is_activating = False
         self.state: GripState | None = None
         self.n_answers = 0
 
@@ -86,6 +99,7 @@ class RobotiqGripper:
         """
         self._received = self._outgoing = b""
         self._said.clear()
+        self._n_deaf, self._is_watched, self._is_activating = 0, False, False
         self._grip = self._asked = self.state = None
         self._is_query_out, self._n_silent, self._n_since_asked = False, 0, ASK_EVERY
         try:
@@ -100,15 +114,56 @@ class RobotiqGripper:
 
     @property
     def is_active(self) -> bool:
-        """Whether the gripper has been activated since it got power."""
-        return self._said.get("STA") == READY and self._said.get("ACT") == 1
+        """Whether the gripper has been activated since it got power, and has no fault."""
+        said = self._said
+        return said.get("STA") == READY and said.get("ACT") == 1 and said.get("FLT") == 0
 
-    def activate(self) -> None:
-        """Begin the activation stroke: the fingers open and shut all the way, and drop what they hold."""
-        self._send("SET ACT 1\nSET GTO 1\n")
+    def activate(self, see: Callable[[], object], *, limit_s: float = ACTIVATE_S) -> None:
+        """Reset and activate: the fingers open and shut all the way, and drop what they hold. Waits for the end.
+
+        Broken off, by whatever, it is taken back: the fingers stop where they are.
+
+        Args:
+            see: waits a little and polls; raises where the fingers may not go on.
+            limit_s: how long it may take.
+
+        Raises:
+            WireError: it did not come to its end in time.
+        """
+        deadline_ns = monotonic_ns() + round(limit_s * 1e9)
+        self._is_activating = True
+        try:
+            # Activating what is active already does nothing, and nothing else clears a fault.
+            self._send("SET ACT 0 GTO 0\n")
+            while (self._said.get("STA"), self._said.get("ACT")) != (RESET, 0):
+                self._see_in_time(see, deadline_ns)
+            self._send("SET ACT 1\n")
+            while not self.is_active:
+                self._see_in_time(see, deadline_ns)
+        except BaseException:
+            self.halt()
+            raise
+        self._is_activating = False
+
+    def halt(self) -> None:
+        """Stop what was asked for from here: fingers that hold something go on holding it, all others stand.
+
+        An activation under way is taken back, so that the next to use the gripper must activate it.
+
+        Raises:
+            WireError: the gripper closed the connection.
+        """
+        asked, is_activating = self._asked, self._is_activating
+        self._is_watched = self._is_activating = False
+        if is_activating:
+            self._send("SET ACT 0\n")
+        elif asked is not None and not self._is_holding(asked[0]):
+            self._grip = self._asked = None  # the same again is to be sent again
+            self._send("SET GTO 0\n")
 
     def command(self, grip: GripCommand) -> None:
-        """Ask for an opening; the same again sends nothing."""
+        """Ask for an opening; the same again sends nothing. From now on it must stay active and without a fault."""
+        self._is_watched = True
         if grip is self._grip:
             return
         scale, self._grip = self._scale, grip
@@ -125,13 +180,14 @@ class RobotiqGripper:
             is_awaited: ask as soon as the last question is answered.
 
         Raises:
-            WireError: the gripper closed the connection or has been silent for too long.
+            WireError: the gripper closed the connection or has been silent for too long, has no power, or, once it was
+                commanded, is not active any more or tells of a fault.
         """
         self._flush()
         self._n_since_asked += 1
         if not self._is_query_out:
             if is_awaited or self._n_since_asked >= ASK_EVERY:
-                self._send("GET POS\nGET OBJ\nGET STA\nGET ACT\n")
+                self._send("GET POS\nGET OBJ\nGET STA\nGET FLT\nGET ACT\n")
                 self._is_query_out, self._n_silent, self._n_since_asked = True, 0, 0
             return self.state
         self._receive()
@@ -178,13 +234,48 @@ class RobotiqGripper:
         while line.startswith(ACKNOWLEDGED):  # sent without an end of line, before the next answer
             line = line[len(ACKNOWLEDGED) :]
         words = line.split()
+        if len(words) == 2 and words[1] == NO_VALUE:
+            self._note_deaf(words[0])
         if len(words) != 2 or not words[1].isdigit():
             return
         self._said[words[0]] = int(words[1])
-        if words[0] == "ACT":  # the last of the four questions
-            self._is_query_out = False
+        if words[0] == "ACT":  # the last of the five questions
+            self._is_query_out, self._n_deaf = False, 0
             self.n_answers += 1
+            self._judge()
             self._tell()
+
+    def _note_deaf(self, name: str) -> None:
+        self._said.pop(name, None)
+        if name != "ACT":
+            return
+        self._is_query_out = False
+        self._n_deaf += 1
+        if self._n_deaf >= DEAF_LIMIT:
+            raise WireError("gripper: expected values, its port has none; has the tool power, and is it plugged in?")
+
+    def _judge(self) -> None:
+        """Raise where a gripper that was commanded does not obey any more."""
+        if not self._is_watched or self.is_active:
+            return
+        said = self._said
+        fault = said.get("FLT", 0)
+        came = f"fault {fault} ({_FAULTS.get(fault, 'see its manual')})" if fault else "none"
+        raise WireError(
+            f"gripper: expected it active (STA 3) and no fault, came STA {said.get('STA')}, ACT {said.get('ACT')}, "
+            f"{came}; look at it, it is activated when somebody engages again"
+        )
+
+    def _is_holding(self, asked: int) -> bool:
+        """Return whether something keeps the fingers from the position asked for."""
+        at, found = self._said.get("POS", 0), self._said.get("OBJ")
+        return (found == HELD_WHILE_CLOSING and asked >= at) or (found == HELD_WHILE_OPENING and asked <= at)
+
+    def _see_in_time(self, see: Callable[[], object], deadline_ns: int) -> None:
+        see()
+        if monotonic_ns() > deadline_ns:
+            said = {name: self._said.get(name) for name in ("ACT", "STA", "FLT")}
+            raise WireError(f"gripper: expected its activation to end in time, it says {said}")
 
     def _tell(self) -> None:
         position, status = self._said.get("POS"), self._said.get("OBJ")

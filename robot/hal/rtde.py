@@ -4,11 +4,12 @@ Connecting reads only: the receive and dashboard clients. The control client upl
 runs, so it is made by `engage`, after somebody has armed. It never outlives a stop or a stale state, because it would
 go on by itself where it was left: it repeats a command after a reconnection, and the script acts on the registers' last
 values. Whoever wants to move again makes a new one, by `engage`. Where the link was lost the client is not even told to
-stop, for any word to it may make it reconnect: the controller's watchdog stops the arm, and the process has to end.
+stop, for any word to it may make it reconnect: the controller's watchdog stops the arm, and the process has to end. A
+guard sees to that where nobody ticks: between engaging and the first command, and while the arm is stopped.
 """
 
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Sequence
+from contextlib import suppress
 from time import monotonic_ns
 
 from dashboard_client import DashboardClient
@@ -17,19 +18,27 @@ from rtde_receive import RTDEReceiveInterface
 
 from config.arm import ArmConfig
 from config.cell import CellConfig
-from robot.errors import NotEngagedError, RobotError, StaleStateError, WireError
+from robot.errors import ArmRefusedError, NotEngagedError, StaleStateError, WireError
 from robot.geometry import quat_of_rotation_vector
-from robot.hal.link_watch import LinkWatch
 from robot.hal.pins import Pins
 from robot.hal.protocols import Clock
 from robot.hal.robotiq import GripScale, RobotiqGripper
 from robot.hal.rtde_clock import RtdeClock
+from robot.hal.rtde_links import RtdeLinks
 from robot.hal.rtde_outputs import N_OUTPUTS, DigitalOutputs
-from robot.hal.rtde_set_up import arm_watchdog, prove_watchdog, require, set_tool, status_of
+from robot.hal.rtde_set_up import (
+    arm_watchdog,
+    end_program,
+    prove_watchdog,
+    require,
+    set_tool,
+    status_of,
+)
+from robot.hal.ur_calls import bounded, named
 from robot.hal.ur_checks import check_facts, check_pose, check_serial
 from robot.hal.ur_primary import read_facts
-from robot.hal.ur_state import Runtime, UrStatus, check_ready, check_version, mode_of, parse_version
-from robot.messages import ArmCommand, ArmSpec, ArmState, GripState, Vec6
+from robot.hal.ur_state import Runtime, UrStatus, check_ready, check_version, mode_of, parse_version, why_refused
+from robot.messages import ArmCommand, ArmMode, ArmSpec, ArmState, GripState, Vec6
 
 __all__ = ["RtdeArm"]
 
@@ -42,11 +51,12 @@ FIELDS = (
 """All that is read here. Left to itself the client asks for 58 and more, which the controller would pack, and a thread
 beside the servo loop unpack, 500 times a second."""
 STALE_NS, HAND_NS = 50_000_000, 40_000_000
-RTDE_PORT = 30004
 WRITE_NS = 35_000_000
 """A command that took longer was no mere sending: the client may have reconnected in it, which takes 40 ms at least."""
 STOP_RAD_S2, REST_S, STILL_RAD_S = 10.0, 1.0, 0.01
 START_S = 2.0
+TAKE_S = 8.0
+"""Longer than the client takes to be made, or to give up. One that lost its link meanwhile may wait for ever."""
 
 
 class RtdeArm:
@@ -82,8 +92,8 @@ class RtdeArm:
         self._gripper = RobotiqGripper(GripScale.of(arm.tool))
         self._last_timestamp, self._seen_ns, self._polled_ns = -1.0, 0, 0
         self._pins = Pins(cell)
-        self._links = LinkWatch(address, RTDE_PORT)
-        self._is_lost = False
+        self.links = RtdeLinks(address)
+        """Who may end this process is set on them."""
         self._runtime = Runtime.STOPPED
         """As the last state read told."""
         self._modes, self._mode = (-1, 0), mode_of(-1, 0)
@@ -102,7 +112,7 @@ class RtdeArm:
             return
         facts = read_facts(self.address)
         dashboard = DashboardClient(self.address)
-        with _named("dashboard", self.address):
+        with named("dashboard", self.address):
             dashboard.connect()
             version = parse_version(dashboard.polyscopeVersion())
             self.serial = dashboard.getSerialNumber().strip()
@@ -111,7 +121,7 @@ class RtdeArm:
         check_version(version)
         check_facts(facts, self._arm)
         check_pose(facts)
-        with _named("RTDE", self.address):
+        with named("RTDE", self.address):
             self._receive = RTDEReceiveInterface(self.address, RATE_HZ, list(FIELDS))
         self._dashboard = dashboard
         self._gripper.connect(self.address)
@@ -121,23 +131,31 @@ class RtdeArm:
     def engage(self) -> None:
         """Take command of the arm, unless it is ours already. Nothing moves yet but a hand that needs activating.
 
+        That hand is waited for, some seconds.
+
         Raises:
             ArmRefusedError: the arm is not ready, or belongs to somebody else, or its watchdog does not work.
-            StaleStateError: this process lost its link before.
+            StaleStateError: this process lost its link, before or now.
+            WireError: somebody does not answer.
         """
-        if self._is_lost:
+        if self.links.is_lost:
             raise StaleStateError("arm: expected a process that never lost its link; end this one and start another")
         if self._control is not None:
             return
         receive, dashboard = self._reading()
-        check_ready(self.status(), is_remote=_is_remote(dashboard))
-        prove_watchdog(self._take_control(), receive, self.clock)
-        self._control = self._take_control()
+        with named("dashboard", self.address):
+            is_remote = bool(dashboard.isInRemoteControl())
+        check_ready(self.status(), is_remote=is_remote)
+        self.read()
+        if not self._gripper.is_active:
+            self._gripper.activate(self._see_running)
+            check_ready(self.status(), is_remote=is_remote)  # somebody may have begun something meanwhile
         try:
-            self._set_up(self._control, receive)
-            self._links.look()
-        except (RobotError, RuntimeError):
+            with named("RTDE control", self.address):
+                self._take_command(receive)
+        except BaseException:
             # An arm that was set up by half is nobody's: the next engage begins anew.
+            self._require_link()
             self._drop_control(is_in_traceback=True)
             raise
 
@@ -193,7 +211,7 @@ class RtdeArm:
         )  # fmt: skip
         spent_ns = monotonic_ns() - begun_ns
         if spent_ns > WRITE_NS:
-            self._is_lost = True
+            self.links.is_lost = True
             raise StaleStateError(
                 f"servoJ: expected it sent within {WRITE_NS / 1e6:g} ms, it took {spent_ns / 1e6:.0f} ms; the client "
                 "may have reconnected by itself"
@@ -209,19 +227,29 @@ class RtdeArm:
         self._ask_hand()
 
     def stop(self) -> bool:
-        """Bring the arm to rest and give up command; the hand keeps its grip. Returns whether rest was seen.
+        """Bring arm and fingers to rest and give up command; a hand that holds something goes on holding it.
 
-        Where the link was lost nothing is sent: the controller's watchdog stops the arm.
+        An activation under way is taken back. Where the link was lost nothing is sent to the arm: the controller's
+        watchdog stops it.
+
+        Returns:
+            Whether rest was seen, and that the program has ended. Where not, this process must end.
         """
-        if self._is_lost:
+        self.abandon()
+        if self.links.is_lost_now:
             return False
         if self._control is not None:
             with suppress(RuntimeError):
                 self._control.servoStop(STOP_RAD_S2)
         is_resting = self._wait_rest()
-        if not self._is_lost:
-            self._drop_control()
-        return is_resting
+        if self.links.is_lost_now:
+            return False
+        return self._drop_control() and is_resting
+
+    def abandon(self) -> None:
+        """Stop the fingers: their wire is another than the arm's, and may be spoken on whatever became of that one."""
+        with suppress(WireError):
+            self._gripper.halt()
 
     def close(self) -> None:
         """Stop, and close every client. Idempotent, never raises."""
@@ -243,11 +271,7 @@ class RtdeArm:
     # -------------------------------------------------------------------------------------------------------- inside
 
     def _require_link(self) -> None:
-        """Raise StaleStateError where the controller hung up, before the client finds out and reconnects."""
-        if self._links.is_cut():
-            self._is_lost = True
-        if self._is_lost:
-            raise StaleStateError("arm: expected its link to stand, it was cut; whoever wants to move begins anew")
+        self.links.require()
 
     def _reading(self) -> tuple[RTDEReceiveInterface, DashboardClient]:
         if self._receive is None or self._dashboard is None:
@@ -261,7 +285,7 @@ class RtdeArm:
             self._last_timestamp, self._seen_ns = timestamp, now_ns
         elif now_ns - self._seen_ns > STALE_NS:
             age_ms = (now_ns - self._seen_ns) / 1e6
-            self._is_lost |= self._control is not None
+            self.links.is_lost |= self._control is not None
             raise StaleStateError(
                 f"arm: expected a state every 2 ms, the newest is {age_ms:.0f} ms old; is the link up?"
             )
@@ -298,78 +322,83 @@ class RtdeArm:
             else:
                 return
 
+    def _see_running(self) -> None:
+        """Wait a tick and look at arm and hand; where the arm may not move the hand may not either."""
+        self.clock.wait_tick()
+        if self.read().mode is not ArmMode.RUNNING:
+            raise ArmRefusedError(f"hand: its activation was broken off: {why_refused(self.status())}")
+
+    def _take_command(self, receive: RTDEReceiveInterface) -> None:
+        self.links.look()
+        self.links.begin_guard(receive.getTimestamp)
+        self._control = self._take_control()
+        prove_watchdog(self._control, receive, self.clock)
+        self._require_link()
+        self.links.pause()
+        self._control = None
+        self.links.look()
+        self._control = self._take_control()
+        self._set_up(self._control, receive)
+        self._require_link()
+
     def _take_control(self) -> RTDEControlInterface:
-        with _named("RTDE control", self.address):
-            return RTDEControlInterface(self.address, RATE_HZ, RTDEControlInterface.FLAG_UPLOAD_SCRIPT)
+        with bounded(TAKE_S if self.links.when_lost is not None else None):
+            control = RTDEControlInterface(self.address, RATE_HZ, RTDEControlInterface.FLAG_UPLOAD_SCRIPT)
+        self.links.look()
+        return control
 
     def _set_up(self, control: RTDEControlInterface, receive: RTDEReceiveInterface) -> None:
-        """Set payload and tool centre point, open the outputs and the hand, arm the watchdog last."""
+        """Set payload and tool centre point, open the outputs, arm the watchdog last."""
         set_tool(control, receive, self.clock, self._arm.tool)
         self._outputs = DigitalOutputs(self.address, bits=receive.getActualDigitalOutputBits() & _ALL_BITS)
+        self.links.look()
         self._pins.forget()
-        if not self._gripper.is_active:
-            self._gripper.activate()
         arm_watchdog(control, receive, self.clock)  # from here on somebody must write
 
-    def _drop_control(self, *, is_in_traceback: bool = False) -> None:
+    def _drop_control(self, *, is_in_traceback: bool = False) -> bool:
         """End the program and forget its client: it must never get the chance to go on by itself.
 
         A client disconnects when its last reference goes, and sleeps half a second each time it does. So it is told to
-        only where a traceback keeps it alive.
+        only where a traceback keeps it alive. Until it goes its link is watched: one that was lost is kept.
+
+        Returns:
+            Whether the program has ended.
         """
-        self._links.forget()
-        control, self._control = self._control, None
+        is_ended = True
+        if self._control is not None:
+            receive, dashboard = self._reading()
+            is_ended = end_program(self._control, receive, dashboard, self.clock)
         outputs, self._outputs = self._outputs, None
-        if control is not None:
-            with suppress(RuntimeError):
-                control.stopScript()
-            with suppress(RuntimeError, WireError):
-                self._runtime = self.status().runtime
-            self._end_program()
         if outputs is not None:
             with suppress(RuntimeError):
                 outputs.put(self._pins.rested(outputs.bits))
+        if self.links.is_lost_now:
+            return False
+        self.links.forget()
+        if outputs is not None:
             outputs.close()
+        control, self._control = self._control, None
         if control is not None and is_in_traceback:
             with suppress(RuntimeError):
                 control.disconnect()
-
-    def _end_program(self) -> None:
-        """End what a stop has only paused: nothing may go on by itself when somebody releases the stop."""
-        if self._dashboard is not None and self._runtime not in (Runtime.STOPPED, Runtime.STOPPING):
-            with suppress(RuntimeError):
-                self._dashboard.stop()
+        return is_ended
 
     def _refuse(self, what: str) -> None:
         require(False, what, receive=self._reading()[0], clock=self.clock)
 
     def _wait_rest(self) -> bool:
-        """Wait until the joints rest, at most REST_S. Returns whether they do."""
-        if self._receive is None:
+        """Wait until the joints rest, at most REST_S, whatever the hand says. Returns whether they do."""
+        receive, deadline_ns = self._receive, monotonic_ns() + round(REST_S * 1e9)
+        if receive is None:
             return True
-        deadline_ns = monotonic_ns() + round(REST_S * 1e9)
-        while monotonic_ns() < deadline_ns:
-            try:
-                state = self.read()
+        with suppress(WireError, RuntimeError):  # the client throws the latter where it has no state
+            while monotonic_ns() < deadline_ns:
+                self._require_link()
+                self._note_freshness(receive)
                 self.clock.wait_tick()
-            except (WireError, RuntimeError):  # the client throws the latter where it has no state
-                return False
-            if max(abs(v) for v in state.qd_rad_s) < STILL_RAD_S:
-                return True
+                if max(abs(v) for v in receive.getActualQd()) < STILL_RAD_S:
+                    return True
         return False
-
-
-@contextmanager
-def _named(what: str, address: str) -> Iterator[None]:
-    """Turn what the client throws, which is of one kind for all, into an error that says who did not answer."""
-    try:
-        yield
-    except RuntimeError as error:
-        raise WireError(f"{what}: expected an answer at {address}, got: {error}") from error
-
-
-def _is_remote(dashboard: DashboardClient) -> bool:
-    return bool(dashboard.isInRemoteControl())
 
 
 def _vec6(values: Sequence[float]) -> Vec6:

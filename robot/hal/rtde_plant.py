@@ -1,6 +1,6 @@
 """A UR5e as a plant: the arm at the rig's address."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 from config.arm import ArmConfig
 from config.cell import CellConfig
@@ -49,6 +49,14 @@ class RtdePlant:
         self.cameras: Mapping[str, Camera] = {}
         self.truth: SceneTruth | None = None
         self.resetter: Resetter = _NoResetter()
+
+    def end_by(self, end: Callable[[], object]) -> None:
+        """Have this process ended by this, once the link is lost where nobody ticks."""
+        self.arm.links.when_lost = end
+
+    def abandon(self) -> None:
+        """Stop the fingers, before this process ends."""
+        self.arm.abandon()
 
     @property
     def identity(self) -> PlantIdentity:

@@ -1,7 +1,9 @@
-"""What a control client must bear out before anything moves: the controller's watchdog, the payload, the tool."""
+"""What a control client must bear out before anything moves, the watchdog, payload and tool, and how it is ended."""
 
+from contextlib import suppress
 from time import monotonic_ns
 
+from dashboard_client import DashboardClient
 from rtde_control import RTDEControlInterface
 from rtde_receive import RTDEReceiveInterface
 
@@ -10,7 +12,7 @@ from robot.errors import ArmRefusedError
 from robot.hal.protocols import Clock
 from robot.hal.ur_state import Runtime, UrStatus, is_well, why_refused
 
-__all__ = ["arm_watchdog", "prove_watchdog", "require", "set_tool", "status_of"]
+__all__ = ["arm_watchdog", "end_program", "prove_watchdog", "require", "set_tool", "status_of"]
 
 WATCHDOG_HZ = 10.0
 """Commands that come less often stop the program on the controller's side."""
@@ -18,6 +20,7 @@ PROOF_S = 0.5
 """Time on the controller's clock in which an armed and starved watchdog must have stopped the program."""
 PROOF_WALL_S = 5.0
 PAYLOAD_TOLERANCE_KG, CENTRE_TOLERANCE_M, TCP_TOLERANCE = 0.05, 1e-4, 1e-4
+END_S = 0.5
 REASON_TICKS = 5
 
 
@@ -64,13 +67,40 @@ def prove_watchdog(control: RTDEControlInterface, receive: RTDEReceiveInterface,
     while receive.getTimestamp() - begun_s < PROOF_S and monotonic_ns() < deadline_ns:
         clock.wait_tick()
         if status_of(receive).runtime == Runtime.STOPPED:
-            return  # the client disconnects as it is dropped
-    control.stopScript()
-    control.disconnect()
+            return
     raise ArmRefusedError(
         f"expected the controller's watchdog to end a program that is silent for {1e3 / WATCHDOG_HZ:.0f} ms, "
         f"it ran on for {PROOF_S:g} s: do not move this arm"
     )
+
+
+def end_program(
+    control: RTDEControlInterface, receive: RTDEReceiveInterface, dashboard: DashboardClient, clock: Clock
+) -> bool:
+    """End the client's program, and what a stop has only paused: nothing may go on by itself when that is released.
+
+    Returns:
+        Whether it was seen to have ended. In local control nobody but a person at the pendant can end what is paused.
+    """
+    with suppress(RuntimeError):
+        control.stopScript()
+        if _await_end(receive, clock):
+            return True
+    with suppress(RuntimeError):
+        dashboard.stop()
+    with suppress(RuntimeError):
+        return _await_end(receive, clock)
+    return False
+
+
+def _await_end(receive: RTDEReceiveInterface, clock: Clock) -> bool:
+    """Wait until no program runs. What is paused does not end by itself."""
+    deadline_ns = monotonic_ns() + round(END_S * 1e9)
+    while (runtime := status_of(receive).runtime) != Runtime.STOPPED:
+        if monotonic_ns() > deadline_ns or runtime in (Runtime.PAUSING, Runtime.PAUSED):
+            return False
+        clock.wait_tick()
+    return True
 
 
 def set_tool(control: RTDEControlInterface, receive: RTDEReceiveInterface, clock: Clock, tool: Tool) -> None:

@@ -57,6 +57,12 @@ class Gate:
         self._q_rad: Vec6 = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
         self._intent_ns = 0
         self._latched: Refusal | None = None
+        self._is_stop_confirmed = True
+
+    @property
+    def is_stop_confirmed(self) -> bool:
+        """Whether the plant confirmed the stop of the last refusal that latched."""
+        return self._is_stop_confirmed
 
     @property
     def limits(self) -> GateLimits:
@@ -137,7 +143,7 @@ class Gate:
                 if self._when_latched is not None:
                     self._when_latched(verdict)
             finally:
-                self._arm.stop()
+                self._is_stop_confirmed = self._arm.stop()
         return verdict
 
     def _verdict(self, refusal: Refusal, stamp_ns: int) -> Verdict:

@@ -4,7 +4,7 @@ from time import perf_counter
 
 from robot.bench import BenchReport, BenchResult, bench_report
 from sim_twin.broken.course import Course
-from sim_twin.broken.outcome import NOTICED_S, Outcome
+from sim_twin.broken.outcome import Outcome
 from sim_twin.broken.rider import CutShortError, DisturbedError
 from sim_twin.broken.trials import TRIALS, Trial
 
@@ -41,7 +41,7 @@ def _told(outcome: Outcome) -> BenchResult:
     details = outcome.details()
     if failures:
         details["wrong"] = "; ".join(failures)
-    goal = f"<= {1e3 * NOTICED_S:g}, rest, stay" if outcome.trial.is_stop else "borne"
+    goal = f"<= {1e3 * outcome.trial.noticed_s:g}, rest, stay" if outcome.trial.is_stop else "borne"
     value = 1e3 * (outcome.noticed_s or 0.0)
     return BenchResult(
         name=outcome.trial.name, value=round(value, 1), unit="ms", goal=goal, ok=not failures, details=details

@@ -1,5 +1,6 @@
 """One fault after the other against an arm under way: what was said, how soon, how it rested, what came after."""
 
+import os
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from time import monotonic, sleep
@@ -10,9 +11,9 @@ from robot.errors import RobotError
 from sim_twin.broken.judge import Judged, Motion
 from sim_twin.broken.outcome import Outcome
 from sim_twin.broken.pendant import Pendant
-from sim_twin.broken.rider import CutShortError, DisturbedError, Rider
-from sim_twin.broken.trials import JOG_RAD, Stage, Trial
-from sim_twin.controller.process import ControllerProcess
+from sim_twin.broken.rider import NEVER_S, CutShortError, DisturbedError, Raised, Rider
+from sim_twin.broken.trials import JOG_RAD, Moment, Stage, Trial
+from sim_twin.controller.process import ControllerProcess, ask_fault
 from sim_twin.controller.server import Setup
 from sim_twin.paired.machine import SPARE_SHARE, Spare
 
@@ -21,6 +22,14 @@ __all__ = ["Course"]
 BORNE_S = 1.5
 SETTLE_S, AFTER_S, REST_LIMIT_S = 0.3, 0.5, 8.0
 N_TRIES = 6
+
+
+def is_ended(pid: int) -> bool:
+    """Return whether a child of this process has ended, waited for or not."""
+    try:
+        return os.waitid(os.P_PID, pid, os.WEXITED | os.WNOWAIT | os.WNOHANG) is not None
+    except ChildProcessError:
+        return True
 
 
 class Course:
@@ -81,19 +90,18 @@ class _Run:
 
     def run(self) -> Outcome:
         trial, stage, rider = self._trial, self._stage, self._stage.rider
-        rider.take()
-        happened_s, raised = rider.ride_into(
-            lambda: trial.begin(stage), **({} if trial.is_stop else {"wait_s": BORNE_S})
-        )
+        happened_s, raised = self._happen()
         if raised is not None and raised.at_s < happened_s - 1e-3:
             raise DisturbedError(f"before {trial.name}: {raised}")
         if raised is not None and not trial.is_stop:
             raise DisturbedError(f"{trial.name} was not borne: {raised}")
         if trial.is_stop:
             sleep(trial.hold_s)
+            held = self._held()
         else:
             rider.client.close()
             sleep(SETTLE_S)
+            held = None
         jogged, until_s = self._jog()
         barred = self._bar() if trial.bars else None
         ended_s = monotonic()
@@ -112,11 +120,31 @@ class _Run:
             noticed_s=None if raised is None else raised.at_s - happened_s,
             stop=stop,
             barred=barred,
+            held=held,
             jogged_rad=jogged,
             restored_rad=restored,
             rearm_rad=rearm,
             again=again,
         )
+
+    def _happen(self) -> tuple[float, Raised | None]:
+        """Let the fault happen at its moment; return when it did, and what came up."""
+        trial, stage, rider = self._trial, self._stage, self._stage.rider
+
+        def begin() -> float:
+            return trial.begin(stage)
+
+        match trial.during:
+            case Moment.ENGAGE:
+                return rider.engage_into(begin)
+            case Moment.SEED:
+                return rider.seed_into(begin)
+            case Moment.STOP:
+                rider.take()
+                return rider.stop_into(begin)
+            case Moment.RIDE:
+                rider.take()
+                return rider.ride_into(begin, wait_s=NEVER_S if trial.is_stop else BORNE_S)
 
     def _jog(self) -> tuple[float | None, float | None]:
         """Return how far somebody moved a joint, and when he began."""
@@ -126,6 +154,16 @@ class _Run:
         self._stage.fault("jog", rad=[-JOG_RAD, 0.0, 0.0, 0.0, 0.0, 0.0])
         sleep(1.6)
         return self._motion.moved_rad(began_s, monotonic()), began_s
+
+    def _held(self) -> str | None:
+        """Return who still holds an arm that was lost outside a time step, or not seen to stop, where nobody may."""
+        is_riding = self._trial.during is Moment.RIDE
+        if is_riding and not self._trial.ends_process:
+            return None
+        pid, runtime = self._stage.rider.client.pid, ask_fault(self._stage.host, "truth")["runtime"]
+        if pid is not None and not is_ended(pid):
+            return f"process {pid}"
+        return None if is_riding or runtime == "STOPPED" else f"a program: {runtime}"
 
     def _bar(self) -> str | None:
         """Try to take the arm while nobody may."""

@@ -6,9 +6,8 @@ from sim_twin.broken.judge import Judged
 from sim_twin.broken.rider import Raised
 from sim_twin.broken.trials import JOG_RAD, Trial
 
-__all__ = ["NOTICED_S", "Outcome"]
+__all__ = ["Outcome"]
 
-NOTICED_S = 0.1
 STILL_RAD = 1e-3
 """Nothing that rests may move farther by itself."""
 REST_SLACK_S = 0.03
@@ -21,6 +20,8 @@ class Outcome(msgspec.Struct, frozen=True, kw_only=True):
     raised: Raised | None
     noticed_s: float | None
     stop: Judged | None
+    held: str | None
+    """Who held an arm whose link was lost, a while after; None where nobody did."""
     barred: str | None
     """What refused the arm while the fault lasted; None where nothing did, or nobody asked."""
     jogged_rad: float | None
@@ -34,6 +35,8 @@ class Outcome(msgspec.Struct, frozen=True, kw_only=True):
     def failures(self) -> tuple[str, ...]:
         """Return what is not as asked, in words."""
         wrong = list(self._wrong_stop()) if self.trial.is_stop else []
+        if self.held is not None:
+            wrong.append(f"still held by {self.held}")
         if self.trial.bars and self.barred is None:
             wrong.append("the arm could be taken while the fault lasted")
         if self.jogged_rad is not None and not 0.9 * JOG_RAD < self.jogged_rad < 1.1 * JOG_RAD:
@@ -65,7 +68,7 @@ class Outcome(msgspec.Struct, frozen=True, kw_only=True):
         if self.noticed_s is None or self.stop is None:
             return ("not noticed",)
         wrong: list[str] = []
-        if not self.noticed_s <= NOTICED_S:
+        if not self.noticed_s <= self.trial.noticed_s:
             wrong.append(f"noticed after {1e3 * self.noticed_s:.0f} ms")
         if not self.stop.rest_s <= self.stop.predicted_s + REST_SLACK_S:
             wrong.append(f"rest after {self.stop.rest_s:.3f} s, predicted {self.stop.predicted_s:.3f} s")

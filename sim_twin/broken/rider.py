@@ -23,6 +23,27 @@ NEVER_S = 3.0
 """A backend that has said nothing for so long does not notice."""
 
 
+def _lost(why: str | None) -> "Raised | None":
+    return None if why is None else Raised(at_s=monotonic(), what="lost", detail=why)
+
+
+def _beside(
+    inject: Callable[[], float], delay_s: float, do: Callable[[], "Raised | None"]
+) -> tuple[float, "Raised | None"]:
+    """Do something, and let something else happen a little later from another thread; return when, and what came up."""
+    happened: list[float] = []
+
+    def happen() -> None:
+        sleep(delay_s)
+        happened.append(inject())
+
+    thread = Thread(target=happen)
+    thread.start()
+    raised = do()
+    thread.join()
+    return happened[0], raised
+
+
 class DisturbedError(RuntimeError):
     """Something came up before anything was made to go wrong: this machine was busy elsewhere for too long."""
 
@@ -115,19 +136,46 @@ class Rider:
         Returns:
             When it happened, and what came up.
         """
+        self._get_under_way()
+        return _beside(inject, 0.013, lambda: self.ride(wait_s))
+
+    def stop_into(self, inject: Callable[[], float]) -> tuple[float, Raised | None]:
+        """Let something go wrong while the arm is being stopped from full speed; the same is returned."""
+        self._get_under_way()
+        return _beside(inject, 0.013, self._stop)
+
+    def engage_into(self, inject: Callable[[], float]) -> tuple[float, Raised | None]:
+        """Let something go wrong while command is being taken; the same is returned."""
+        self.take()  # the hand is activated by then, which would take its time
+        self.client.stop()
+        return _beside(inject, 0.2, self._engage)
+
+    def seed_into(self, inject: Callable[[], float]) -> tuple[float, Raised | None]:
+        """Let something go wrong between taking command and starting from what is measured; the same is returned."""
+        self.client.connect()
+        self.client.engage()
+        return _beside(inject, 0.0, self._seed)
+
+    def _get_under_way(self) -> None:
         raised = self.ride(0.6)
         while raised is None and not (abs(self._y_m) < REACH_M / 2 and self._y_m * self._way < 0.0):
             raised = self.step()
         if raised is not None:
             raise DisturbedError(f"before anything went wrong: {raised}")
-        happened: list[float] = []
 
-        def happen() -> None:
-            sleep(0.013)
-            happened.append(inject())
+    def _stop(self) -> Raised | None:
+        self.client.stop()
+        return _lost(self.client.why_lost)
 
-        thread = Thread(target=happen)
-        thread.start()
-        raised = self.ride(wait_s)
-        thread.join()
-        return happened[0], raised
+    def _engage(self) -> Raised | None:
+        try:
+            self.client.engage()
+        except RobotError as error:
+            return _lost(str(error))
+        return None
+
+    def _seed(self) -> Raised | None:
+        end_s = monotonic() + NEVER_S
+        while (raised := _lost(self.client.why_lost)) is None and monotonic() < end_s:
+            sleep(0.005)
+        return raised

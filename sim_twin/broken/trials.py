@@ -3,6 +3,7 @@
 import os
 import signal
 from collections.abc import Callable
+from enum import StrEnum
 from time import monotonic, sleep
 from typing import Any
 
@@ -12,9 +13,22 @@ from sim_twin.broken.pendant import Pendant
 from sim_twin.broken.rider import Rider
 from sim_twin.controller.process import ask_fault
 
-__all__ = ["JOG_RAD", "TRIALS", "Stage", "Trial"]
+__all__ = ["JOG_RAD", "TRIALS", "Moment", "Stage", "Trial"]
 
 JOG_RAD = 0.3
+STOP_S = 0.8
+"""A station is told after it has waited until the arm's own watchdog must have stopped the arm: 0.5 s."""
+ENGAGE_S = 1.0
+"""While the client connects or disconnects no other thread of its process runs: 0.6 s."""
+
+
+class Moment(StrEnum):
+    """What the backend is about when it happens."""
+
+    RIDE = "ride"
+    STOP = "stop"
+    ENGAGE = "engage"
+    SEED = "seed"
 
 
 class Stage(msgspec.Struct, frozen=True, kw_only=True):
@@ -42,6 +56,11 @@ class Trial(msgspec.Struct, frozen=True, kw_only=True):
     """Ends it: the link is restored, the stop's cause is gone."""
     person: Callable[[Stage], Any] = _nothing
     """What a person does before anybody may take the arm again."""
+    during: Moment = Moment.RIDE
+    ends_process: bool = False
+    """The stop cannot be confirmed, and the process that held the arm must end for it."""
+    noticed_s: float = 0.1
+    """How soon it must be told."""
     is_stop: bool = True
     """It must be noticed, and the arm must come to rest; else it may be borne."""
     begins_s: float = 0.0
@@ -66,6 +85,18 @@ def _by(name: str, **numbers: object) -> Callable[[Stage], float]:
 def _cut(stage: Stage) -> float:
     stage.fault("refuse", on=True)
     return stage.fault("drop")
+
+
+def _localise(stage: Stage) -> float:
+    """Take remote control away, so that nobody but a person can end a program that the safeguard then pauses."""
+    stage.fault("remote", on=False)
+    return stage.fault("safeguard_open")
+
+
+def _delocalise(stage: Stage) -> None:
+    stage.fault("safeguard_close")
+    sleep(0.5)
+    stage.fault("remote", on=True)
 
 
 def _hang(stage: Stage) -> float:
@@ -103,6 +134,13 @@ TRIALS: tuple[Trial, ...] = (
         name="link_cut_3s_and_jogged", begin=_cut, end=_by("refuse", on=False), hold_s=3.0, is_jogged=True, bars=True,
         is_brief=True,
     ),
+    Trial(name="cut_during_stop", begin=_by("drop"), during=Moment.STOP, noticed_s=STOP_S, hold_s=1.0),
+    Trial(
+        name="cut_3s_during_stop", begin=_cut, end=_by("refuse", on=False), during=Moment.STOP, noticed_s=STOP_S,
+        hold_s=3.0, bars=True,
+    ),
+    Trial(name="cut_during_engage", begin=_by("drop"), during=Moment.ENGAGE, noticed_s=ENGAGE_S, hold_s=1.0),
+    Trial(name="cut_between_engage_and_seed", begin=_by("drop"), during=Moment.SEED, hold_s=1.0),
     Trial(name="rtde_dropped", begin=_by("drop", port=30004)),
     Trial(name="link_late_200ms", begin=_by("delay", ms=200), end=_by("delay", ms=0), begins_s=0.26),
     Trial(name="link_late_20ms", begin=_by("delay", ms=20), end=_by("delay", ms=0), is_stop=False),
@@ -118,6 +156,10 @@ TRIALS: tuple[Trial, ...] = (
     Trial(name="protective_stop", begin=_by("protective_stop"), person=_unlock, bars=True),
     Trial(name="emergency_stop", begin=_by("estop"), end=_by("estop_release"), person=_power_up, bars=True),
     Trial(name="safeguard_open", begin=_by("safeguard_open"), end=_by("safeguard_close"), bars=True, is_brief=True),
+    Trial(
+        name="local_control_then_safeguard", begin=_localise, end=_delocalise, hold_s=2.0, bars=True,
+        ends_process=True,
+    ),
     Trial(name="safety_violation", begin=_by("violation"), person=_restart, bars=True),
     Trial(name="controller_fault", begin=_by("fault"), person=_restart, bars=True),
     Trial(name="program_stopped", begin=_by("program_stop")),

@@ -1,4 +1,7 @@
-"""The gripper behind port 63352: registers in, the twin's fingers out. A stop of the robot does not touch it."""
+"""The gripper behind port 63352: registers in, the twin's fingers out. A stop of the robot does not touch it.
+
+Without the tool's power it is dead: its fingers stand, what is asked is lost, and it comes back reset.
+"""
 
 from collections.abc import Callable
 
@@ -43,8 +46,15 @@ class Hand:
         """How far the fingers are apart."""
         return self._fingers[0].item() + self._fingers[1].item()
 
+    @property
+    def requested(self) -> GripperRequest:
+        """Its registers."""
+        return self._request
+
     def request(self, request: GripperRequest) -> None:
-        """Take new registers."""
+        """Take new registers, unless it has no power."""
+        if not self._is_powered():
+            return
         was_active = bool(self._request.act)
         self._request = request
         if not request.act:
@@ -78,6 +88,8 @@ class Hand:
 
     def tick(self) -> None:
         """Let one slice pass: the activation goes on when a stroke has come to its end."""
+        if not self._is_powered():
+            self._lose_power()
         speed = abs(self._speeds[0].item() + self._speeds[1].item())
         self._n_still = self._n_still + 1 if speed < STILL_M_S else 0
         self._held = self._holding()
@@ -90,6 +102,11 @@ class Hand:
         else:
             self._status = ACTIVE
             self._go()
+
+    def _lose_power(self) -> None:
+        if self._request != GripperRequest():
+            self._stand()
+        self._request, self._status, self._strokes = GripperRequest(), RESET, []
 
     def _go(self) -> None:
         request = self._request

@@ -235,8 +235,8 @@ def pairs(states, *, apart_s):
     return found
 
 
-def test_stopping_rests_soon_holds_the_grip_can_be_repeated_and_is_no_end(driver):
-    driver.opening = 0.03
+def test_stopping_rests_arm_and_empty_fingers_soon_can_be_repeated_and_is_no_end(driver):
+    driver.opening = 0.0
     driver.ramp([1.0, 0, 0, 0, 0, 0], 0.4)
     arm = driver.plant.arm
     before = arm.read()
@@ -247,11 +247,24 @@ def test_stopping_rests_soon_holds_the_grip_can_be_repeated_and_is_no_end(driver
     wait(arm, 0.1)
     assert arm.read().q_rad == pytest.approx(rest.q_rad, abs=1e-3)
     assert abs(rest.q_rad[0] - before.q_rad[0]) < 0.25
-    assert rest.grip.opening_m <= before.grip.opening_m + 1e-3
+    check_fingers(before, rest, arm.read())
     arm.engage()
-    driver.q = np.array(arm.read().q_rad)
-    again = driver.ramp([0.2, 0, 0, 0, 0, 0], 0.4)
+    driver.q, driver.opening = np.array(arm.read().q_rad), driver.tool.stroke_m
+    again = driver.ramp([0.2, 0, 0, 0, 0, 0], 0.25)
     assert median(s.qd_rad_s[0] for s in again[len(again) // 2 :]) == pytest.approx(0.2, abs=0.03)
+    assert again[-1].grip.opening_m > before.grip.opening_m
+    assert arm.stop()
+    rest = arm.read()
+    wait(arm, 0.2)
+    check_fingers(again[-1], rest, arm.read())
+
+
+def check_fingers(before, rest, after):
+    """Fingers that were on their way stopped there, opening as well as closing."""
+    assert 0.01 < before.grip.opening_m < 0.08
+    assert rest.grip.opening_m == pytest.approx(before.grip.opening_m, abs=0.012)
+    assert after.grip.opening_m == pytest.approx(rest.grip.opening_m, abs=1e-3)
+    assert not after.grip.is_moving
 
 
 def wait(arm, duration_s):

@@ -32,6 +32,15 @@ def test_the_hand_stops_on_what_lies_between_the_jaws_and_says_so(plant):
     assert not grip.is_moving
 
 
+def test_a_stop_goes_on_holding_what_is_held(plant):
+    plant.arm.held_opening_m = 0.044
+    shut(plant, 60)
+    plant.arm.stop()
+    for _ in range(20):
+        plant.arm.clock.wait_tick()
+    assert plant.arm.read().grip.has_object
+
+
 def test_an_object_that_is_gone_lets_the_jaws_meet(plant):
     plant.arm.held_opening_m = 0.044
     shut(plant, 60)

@@ -7,7 +7,7 @@ from robot.errors import WireError
 from robot.hal import robotiq
 from robot.hal.robotiq import GripScale, RobotiqGripper
 from robot.messages import GripCommand
-from sim_twin.controller.wire.gripper_port import GripperMeasurement, GripperServer
+from sim_twin.controller.wire.gripper_port import GripperMeasurement, GripperRequest, GripperServer
 from sim_twin.controller.wire.peer import Budget
 from sim_twin.controller.wire.reactor import Reactor
 
@@ -19,10 +19,15 @@ class Fingers:
     """What stands behind the port: registers that a test reads and sets."""
 
     def __init__(self):
-        self.asked, self.measured = None, GripperMeasurement(pos=3, pre=3, sta=0, obj=3)
+        self.registers = GripperRequest(act=1)
+        self.asked, self.measured = None, GripperMeasurement(pos=3, pre=3, sta=3, obj=3)
+
+    @property
+    def requested(self):
+        return self.registers
 
     def request(self, request):
-        self.asked = request
+        self.asked = self.registers = request
 
     def measure(self):
         return self.measured
@@ -65,6 +70,7 @@ def grip(opening_m, force_n=TOOL.force_n[0], speed_m_s=TOOL.speed_m_s[1]):
 
 
 def test_connecting_and_reading_ask_for_no_motion(bench):
+    bench.fingers.registers = GripperRequest()
     bench.turn(lambda: bench.gripper.state is not None)
     assert bench.fingers.asked is None
     assert not bench.gripper.is_active
@@ -72,11 +78,101 @@ def test_connecting_and_reading_ask_for_no_motion(bench):
     assert not bench.gripper.state.is_moving
 
 
-def test_activation_is_asked_for_and_seen(bench):
-    bench.gripper.activate()
-    bench.turn(lambda: bench.fingers.asked is not None and bench.fingers.asked.act == 1)
-    bench.fingers.measured = GripperMeasurement(pos=3, pre=3, sta=3, obj=3)
+class Strokes:
+    """Lets a gripper take its time over an activation, turn by turn; `seen` is what it was in."""
+
+    def __init__(self, bench, n_turns):
+        self.bench, self.n_turns, self.seen = bench, n_turns, []
+
+    def __call__(self):
+        bench, fingers = self.bench, self.bench.fingers
+        sta = 0 if not fingers.registers.act else 1 if self.n_turns > 0 else 3
+        self.n_turns -= fingers.registers.act
+        self.seen.append(sta)
+        fingers.measured = GripperMeasurement(pos=3, pre=3, sta=sta, obj=3)
+        bench.reactor.poll()
+        bench.gripper.poll()
+
+
+def test_an_activation_begins_with_a_reset_and_is_waited_for(bench):
     bench.turn(lambda: bench.gripper.is_active)
+    strokes = Strokes(bench, 20)
+    bench.gripper.activate(strokes)
+    assert bench.gripper.is_active
+    phases = [sta for i, sta in enumerate(strokes.seen) if i == 0 or sta != strokes.seen[i - 1]]
+    assert phases[-3:] == [0, 1, 3]
+    assert (bench.fingers.registers.act, bench.fingers.registers.gto) == (1, 0)
+
+
+def test_an_activation_without_end_is_taken_back_and_said(bench):
+    with pytest.raises(WireError, match="activation"):
+        bench.gripper.activate(Strokes(bench, 10**9), limit_s=0.05)
+    bench.turn(lambda: bench.fingers.registers.act == 0)
+
+
+def test_an_activation_that_is_broken_off_is_taken_back(bench):
+    strokes = Strokes(bench, 10**9)
+
+    def see():
+        strokes()
+        if strokes.seen[-1] == 1:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        bench.gripper.activate(see)
+    bench.turn(lambda: bench.fingers.registers.act == 0)
+
+
+@pytest.mark.parametrize(
+    ("pos", "obj", "opening_m", "gto"),
+    [
+        (120, 0, 0.0, 0),  # closes
+        (120, 0, TOOL.stroke_m, 0),  # opens
+        (255, 3, 0.0, 0),  # is there: it stands anyway
+        (120, 2, 0.0, 1),  # holds
+        (120, 1, TOOL.stroke_m, 1),  # holds from within
+        (120, 2, TOOL.stroke_m, 0),  # lets go of what it held
+    ],
+)
+def test_a_halt_stands_unless_something_is_held(bench, pos, obj, opening_m, gto):
+    bench.fingers.measured = GripperMeasurement(pos=pos, pre=pos, sta=3, obj=obj)
+    bench.gripper.command(grip(opening_m))
+    n_answers = bench.gripper.n_answers
+    bench.turn(lambda: bench.gripper.n_answers > n_answers + 1)
+    bench.gripper.halt()
+    bench.turn(lambda: bench.gripper.n_answers > n_answers + 3)
+    assert (bench.fingers.registers.gto, bench.fingers.registers.act) == (gto, 1)
+    bench.gripper.command(grip(opening_m))
+    bench.turn(lambda: bench.fingers.registers.gto == 1)
+
+
+def test_what_somebody_else_asked_for_is_not_halted(bench):
+    bench.fingers.registers = GripperRequest(act=1, gto=1, pos=255)
+    bench.fingers.measured = GripperMeasurement(pos=120, pre=255, sta=3, obj=0)
+    bench.turn(lambda: bench.gripper.state is not None)
+    bench.gripper.halt()
+    bench.turn(lambda: bench.gripper.n_answers > 4)
+    assert bench.fingers.asked is None
+
+
+@pytest.mark.parametrize(("sta", "flt", "said"), [(0, 0, "STA 0"), (1, 0, "STA 1"), (3, 8, "too hot"), (3, 77, "77")])
+def test_a_commanded_gripper_that_obeys_no_more_says_so(bench, sta, flt, said):
+    bench.gripper.command(grip(0.0))
+    bench.turn(lambda: bench.gripper.n_answers > 2)
+    bench.fingers.measured = GripperMeasurement(pos=3, pre=3, sta=sta, obj=3, flt=flt)
+    with pytest.raises(WireError, match=said):
+        bench.turn(lambda: False)
+
+
+def test_one_that_nobody_commands_may_be_in_any_state(bench):
+    bench.fingers.measured = GripperMeasurement(pos=3, pre=3, sta=0, obj=3, flt=8)
+    bench.turn(lambda: bench.gripper.n_answers > 4)
+
+
+def test_a_gripper_without_power_is_said(bench):
+    bench.fingers.measured = GripperMeasurement(pos=3, pre=3, sta=0, obj=3, is_powered=False)
+    with pytest.raises(WireError, match="power"):
+        bench.turn(lambda: False)
 
 
 def test_a_command_arrives_in_the_grippers_bytes_and_the_same_again_sends_nothing(bench):

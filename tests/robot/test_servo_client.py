@@ -207,3 +207,12 @@ def test_what_is_no_intent_is_refused_by_the_gate_and_the_process_lives(client, 
     client.engage()
     client.seed()
     assert stride(client, go()).verdict is None
+
+
+def test_a_process_that_ends_says_nothing_over_what_a_person_reads(capfd):
+    made = ServoClient(fake_rig())
+    made.engage()
+    made.seed()
+    assert stride(made, go()).verdict is None
+    made.close()
+    assert capfd.readouterr() == ("", "")

@@ -15,10 +15,12 @@ from robot.servo_messages import (
     Connect,
     Done,
     Engage,
+    Failure,
     Reply,
     Request,
     Seed,
     Seeded,
+    Stop,
     StrideReply,
     StrideRequest,
     pack_intent,
@@ -139,4 +141,49 @@ def test_a_latch_that_crosses_a_time_step_on_the_way_answers_it_once(served, mon
         assert came.verdict.reason == "arm_mode"
         served.plant.arm.mode = ArmMode.RUNNING
         assert client.seed().mode is ArmMode.RUNNING  # and the refusal of the time step is not taken for this answer
+    assert isinstance(served.ask(Close()), Done)
+
+
+@pytest.mark.parametrize("is_confirmed", [True, False])
+def test_a_stop_that_nobody_confirms_is_said_and_ends_the_process(served, is_confirmed):
+    served.plant.arm.stop = lambda: is_confirmed
+    told = served.ask(Stop())
+    if is_confirmed:
+        assert isinstance(told, Done)
+        assert isinstance(served.ask(Close()), Done)
+    else:
+        served.thread.join(WAIT_S)
+        assert (told.kind, told.is_end) == ("WireError", True)
+        assert "at rest" in told.message
+        assert served.ended_by == "death"
+
+
+def test_a_latch_whose_stop_nobody_confirms_ends_the_process(served):
+    served.plant.arm.stop = lambda: False
+    served.plant.arm.mode = ArmMode.PROTECTIVE_STOP
+    assert served.hear().stride.verdict.reason == "arm_mode"
+    served.thread.join(WAIT_S)
+    assert served.ended_by == "death"
+
+
+@pytest.mark.parametrize("error", [StaleStateError("no state"), WireError("no answer")])
+@pytest.mark.parametrize("request_", [Engage(), Seed()])
+def test_an_arm_lost_outside_a_time_step_is_told_and_ends_the_process(served, error, request_):
+    def fail():
+        raise error
+
+    assert isinstance(served.ask(Stop()), Done)
+    served.plant.arm.engage = served.plant.arm.read = fail
+    told = served.ask(request_)
+    served.thread.join(WAIT_S)
+    assert (told.kind, told.is_end) == (type(error).__name__, True)
+    assert served.ended_by == "death"
+
+
+def test_an_arm_that_refuses_is_asked_again_by_the_same_process(served):
+    def refuse():
+        raise ArmRefusedError("local control")
+
+    served.plant.arm.engage = refuse
+    assert served.ask(Engage()) == Failure(kind="ArmRefusedError", message="local control")
     assert isinstance(served.ask(Close()), Done)

@@ -214,3 +214,24 @@ def test_things_may_have_the_names_of_the_arms_own_parts_and_of_one_anothers(tmp
     plant.resetter.reset(seed=3, epoch=0, digital_out=0)
     named = {thing.name for thing in plant.truth.read().objects}
     assert {"flange", "tcp", "tcp_cap", "link_3", "grip", "finger_left"} < named
+
+
+def test_a_stop_goes_on_holding_what_is_held(resolved):
+    plant = make(resolved)
+    arm, world = plant.arm, plant.world
+    arm.connect()
+    q_rad, name = arm.read().q_rad, resolved.scenario.cylinders[0].name
+    address = int(world.model.joint(on_table(name)).qposadr[0])
+    grip = GripCommand(opening_m=0.0, force_n=60.0, speed_m_s=0.15)
+    for k in range(200):
+        # Held up by hand until the fingers have it.
+        world.data.qpos[address : address + 3] = world.data.site("tcp").xpos
+        arm.write(ArmCommand(stamp_ns=0, sequence=k, q_rad=q_rad, grip=grip, digital_out=0))
+        arm.clock.wait_tick()
+        arm.read()
+    assert arm.read().grip.has_object
+    arm.stop()
+    for _ in range(100):
+        arm.clock.wait_tick()
+    assert arm.read().grip.has_object
+    assert np.linalg.norm(np.subtract(poses(plant)[name], arm.read().tcp_position_m)) < 0.02

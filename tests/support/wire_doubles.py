@@ -239,6 +239,10 @@ class Robot:
         return self._asked("set_user_role", role)
 
     # gripper
+    @property
+    def requested(self):
+        return self.requests[-1] if self.requests else GripperRequest()
+
     def request(self, request):
         assert isinstance(request, GripperRequest)
         self.requests.append(request)

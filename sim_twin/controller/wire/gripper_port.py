@@ -64,6 +64,11 @@ class GripperMeasurement(msgspec.Struct, frozen=True, kw_only=True):
 class GripperTarget(Protocol):
     """The gripper behind the port."""
 
+    @property
+    def requested(self) -> GripperRequest:
+        """Its registers as they are; it loses them with its power."""
+        ...
+
     def request(self, request: GripperRequest) -> None:
         """Take new registers; called once for each SET, with all of its values together."""
         ...
@@ -91,7 +96,6 @@ class GripperServer:
 
     def __init__(self, *, target: GripperTarget) -> None:
         self._target = target
-        self._request = GripperRequest()
         self._lines: dict[Peer, LineReader] = {}
 
     def opened(self, peer: Peer) -> None:
@@ -126,7 +130,7 @@ class GripperServer:
         if name in _MEASURED:
             value = getattr(measured, _MEASURED[name])
         elif name in _SETTABLE:
-            value = getattr(self._request, _SETTABLE[name][0])
+            value = getattr(self._target.requested, _SETTABLE[name][0])
         else:
             return _UNKNOWN
         return f"{name} {value if measured.is_powered else '?'}\n".encode()
@@ -139,6 +143,5 @@ class GripperServer:
             if not (text.isdigit() and len(text) <= 3 and int(text) <= greatest):
                 return _UNKNOWN
             changes[field] = int(text)
-        self._request = msgspec.structs.replace(self._request, **changes)
-        self._target.request(self._request)
+        self._target.request(msgspec.structs.replace(self._target.requested, **changes))
         return _ACK

@@ -11,7 +11,7 @@ from sim_twin.broken import TRIALS, Course, CutShortError, DisturbedError
 from sim_twin.paired.machine import SPARE_SHARE, Spare
 
 N_JUDGED = 3
-ESSENTIAL = ("interfaces_frozen_1s", "servo_process_hung_and_jogged", "rtde_dropped")
+ESSENTIAL = ("interfaces_frozen_1s", "servo_process_hung_and_jogged", "rtde_dropped", "cut_during_stop")
 REASONS = {
     "link": "stale_state",
     "rtde": "stale_state",

@@ -445,3 +445,47 @@ def test_noise_is_seen_by_interfaces_and_not_by_physics():
     off = np.array(robot.outputs["actual_q"]()) - robot.machine.world.data.qpos[:6]
     assert off == pytest.approx(bias)
     assert robot.machine.modes.safety is SafetyMode.NORMAL
+
+
+def test_a_hand_without_power_is_dead_and_comes_back_reset():
+    robot = make_robot()
+    robot.hand.request(GripperRequest(act=1, gto=1, spe=255))
+    settle(robot)
+    robot.hand.request(GripperRequest(act=1, gto=1, pos=255, spe=255))
+    run(robot, 60)
+    robot.panel.power_off()
+    run(robot, 20)
+    standing_m = robot.hand.opening_m
+    assert 0.02 < standing_m < 0.08
+    robot.hand.request(GripperRequest(act=1, gto=1, pos=255, spe=255))
+    run(robot, 300)
+    assert robot.hand.opening_m == pytest.approx(standing_m, abs=2e-3)
+    robot.panel.brake_release()
+    run(robot, 2000, lambda: robot.hand.measure().is_powered)
+    assert (robot.hand.measure().sta, robot.hand.requested) == (0, GripperRequest())
+
+
+def test_an_activation_that_is_taken_back_stands_where_it_is():
+    robot = make_robot()
+    robot.hand.request(GripperRequest(act=1))
+    run(robot, 5000, lambda: robot.hand.opening_m < 0.06)
+    robot.hand.request(GripperRequest(act=0))
+    run(robot, 20)
+    standing_m = robot.hand.opening_m
+    run(robot, 300)
+    assert robot.hand.measure().sta == 0
+    assert robot.hand.opening_m == pytest.approx(standing_m, abs=1e-3)
+
+
+def test_fingers_that_are_told_to_go_no_further_stand():
+    robot = make_robot()
+    robot.hand.request(GripperRequest(act=1))
+    settle(robot)
+    robot.hand.request(GripperRequest(act=1, gto=1, pos=0, spe=255))
+    run(robot, 1000, lambda: robot.hand.opening_m > 0.05)
+    robot.hand.request(GripperRequest(act=1, gto=0, pos=0, spe=255))
+    run(robot, 20)
+    standing_m = robot.hand.opening_m
+    run(robot, 300)
+    assert standing_m < 0.075
+    assert robot.hand.opening_m == pytest.approx(standing_m, abs=1e-3)

@@ -1,0 +1,134 @@
+"""What the backend says and leaves behind when a controller in front of it is broken; no servo process beside it."""
+
+import signal
+import socket
+from contextlib import contextmanager
+
+import pytest
+
+from config.loader import load_arm
+from robot.errors import ArmRefusedError, StaleStateError, WireError
+from robot.hal.robotiq import GRIPPER_PORT
+from robot.messages import ArmCommand, GripCommand
+from sim_twin.controller.process import ControllerProcess
+from sim_twin.controller.server import Setup
+from tests.support.loopback import own_address
+
+pytest.importorskip("rtde_control", reason="the genuine client comes with `pip install autotelic[lab]`")
+
+CONFIG = load_arm("ur5e")
+DASHBOARD = 29999
+
+
+@pytest.fixture(scope="module")
+def controller():
+    with ControllerProcess(Setup(host=own_address())) as opened:
+        yield opened
+
+
+@pytest.fixture
+def arm(controller):
+    from robot.hal.rtde import RtdeArm
+
+    made = RtdeArm(arm=CONFIG, address=controller.host)
+    made.connect()
+    yield made
+    made.close()
+
+
+class BrokenOffError(Exception):
+    """A person broke in."""
+
+
+def say(controller, line):
+    """Send a line to the gripper as somebody else."""
+    with socket.create_connection((controller.host, GRIPPER_PORT), timeout=5.0) as connection:
+        connection.sendall(line.encode() + b"\n")
+        return connection.recv(64).decode()
+
+
+def opening(controller):
+    return float(str(controller.fault("truth")["opening_m"]))
+
+
+def drive(arm, opening_m, n_ticks):
+    q_rad = arm.read().q_rad
+    grip = GripCommand(opening_m=opening_m, force_n=20.0, speed_m_s=0.02)
+    for k in range(n_ticks):
+        arm.write(ArmCommand(stamp_ns=arm.clock.now_ns(), sequence=k, q_rad=q_rad, grip=grip, digital_out=0))
+        arm.clock.wait_tick()
+        arm.read()
+
+
+@contextmanager
+def undisturbed():
+    """Skip where this machine kept the arm from its ticks: that says nothing of the hand."""
+    try:
+        yield
+    except (StaleStateError, ArmRefusedError) as error:
+        pytest.skip(f"this machine is too busy to hold an arm: {error}")
+
+
+def wait(arm, n_ticks):
+    for _ in range(n_ticks):
+        arm.clock.wait_tick()
+
+
+def test_an_activation_that_is_broken_off_leaves_the_hand_reset_and_still(controller, arm):
+    def break_in(*_):
+        raise BrokenOffError
+
+    assert say(controller, "SET ACT 0") == "ack"
+    before = signal.signal(signal.SIGALRM, break_in)
+    signal.setitimer(signal.ITIMER_REAL, 1.0)
+    try:
+        with undisturbed(), pytest.raises(BrokenOffError):
+            arm.engage()
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        signal.signal(signal.SIGALRM, before)
+    wait(arm, 50)
+    standing_m = opening(controller)
+    wait(arm, 200)
+    assert opening(controller) == pytest.approx(standing_m, abs=1e-3)
+    assert say(controller, "GET STA") == "STA 0\n"
+    with undisturbed():
+        arm.engage()
+    assert say(controller, "GET STA") == "STA 3\n"
+    assert arm.stop()
+
+
+def test_a_hand_that_loses_its_activation_is_an_error_and_is_activated_anew_at_the_next_engagement(controller, arm):
+    said = ""
+    with undisturbed():
+        arm.engage()
+        drive(arm, 0.02, 20)
+        assert say(controller, "SET ACT 0") == "ack"
+        try:
+            drive(arm, 0.02, 200)
+        except (StaleStateError, ArmRefusedError):
+            raise
+        except WireError as error:
+            said = str(error)
+    assert said.startswith("gripper: expected it active")
+    assert arm.stop()
+    with undisturbed():
+        arm.engage()
+    assert say(controller, "GET STA") == "STA 3\n"
+    assert arm.stop()
+
+
+def test_a_dashboard_that_hung_up_is_said_by_name(controller, arm):
+    controller.fault("drop", port=DASHBOARD)
+    with pytest.raises(WireError, match="dashboard"):
+        arm.engage()
+
+
+def test_a_program_that_only_a_person_can_end_is_no_confirmed_stop(controller, arm):
+    with undisturbed():
+        arm.engage()
+    controller.fault("remote", on=False)
+    controller.fault("safeguard_open")
+    assert not arm.stop()
+    controller.fault("safeguard_close")
+    controller.fault("remote", on=True)
