@@ -146,6 +146,7 @@ class RtdeArm:
         with named("dashboard", self.address):
             is_remote = bool(dashboard.isInRemoteControl())
         check_ready(self.status(), is_remote=is_remote)
+        self._polled_ns = 0  # what the hand said before counts no more
         self.read()
         if not self._gripper.is_active:
             self._gripper.activate(self._see_running)

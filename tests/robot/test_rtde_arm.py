@@ -80,7 +80,7 @@ def test_an_activation_that_is_broken_off_leaves_the_hand_reset_and_still(contro
 
     assert say(controller, "SET ACT 0") == "ack"
     before = signal.signal(signal.SIGALRM, break_in)
-    signal.setitimer(signal.ITIMER_REAL, 1.0)
+    signal.setitimer(signal.ITIMER_REAL, 0.3)
     try:
         with undisturbed(), pytest.raises(BrokenOffError):
             arm.engage()
