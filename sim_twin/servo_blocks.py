@@ -3,7 +3,8 @@
 import math
 import resource
 from collections.abc import Callable
-from time import perf_counter, thread_time
+from contextlib import suppress
+from time import perf_counter, sleep, thread_time
 
 from rtde_control import RTDEControlInterface
 
@@ -22,6 +23,7 @@ LATE_S = 1.5 * PERIOD_S
 INTENT_TICKS, TURN_RAD, STEP_M, HEIGHT_M = 25, 0.3, 0.01, 0.2
 """A new intent every 50 ms, each turned from the one before: the tool goes round a circle of 7 cm."""
 SWING_RAD, SWING_S = 0.02, 2.0
+N_TRIES, PAUSE_S = 5, 0.2
 
 
 class _Listener:
@@ -62,6 +64,15 @@ class _Listener:
         return n_missed
 
 
+def _control_of(address: str) -> RTDEControlInterface:
+    """Return a client that has command; the registers of the one before are free when the controller has seen it go."""
+    for _ in range(N_TRIES - 1):
+        with suppress(RuntimeError):
+            return RTDEControlInterface(address, 1.0 / PERIOD_S, RTDEControlInterface.FLAG_UPLOAD_SCRIPT)
+        sleep(PAUSE_S)
+    return RTDEControlInterface(address, 1.0 / PERIOD_S, RTDEControlInterface.FLAG_UPLOAD_SCRIPT)
+
+
 class Blocks:
     """Runs blocks and counts what their ticks took.
 
@@ -97,7 +108,7 @@ class Blocks:
     def run_bare(self, duration_s: float) -> None:
         """Swing the base with the client's calls alone; a receive interface is open as it is in our blocks."""
         self._arm.connect()
-        control = RTDEControlInterface(self._arm.address, 1.0 / PERIOD_S, RTDEControlInterface.FLAG_UPLOAD_SCRIPT)
+        control = _control_of(self._arm.address)
         q, servo, calls = list(self._arm.read().q_rad), self._servo, Tally()
         middle_rad = q[0]
         begun_s = woke_s = perf_counter()
