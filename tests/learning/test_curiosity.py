@@ -82,11 +82,6 @@ def test_what_was_tried_with_it_on_is_no_suspicion_any_more(graph, monkeypatch):
     assert not any(way[-1:] == (3,) and {0, 1} <= set(way) for way in ways), ways
 
 
-def test_an_epoch_may_be_given_to_what_its_own_goal_needs(graph):
-    ways = probes(graph, 3, curiosity=1.0)
-    assert any(way[-1:] == (3,) and 0 in way for way in ways), ways
-
-
 def test_a_retest_may_take_the_whole_epoch(graph):
     # Goal 2 is shut by goal 0 for good: an epoch of goal 2 in which goal 0 is achieved is lost.
     learn(graph, 2, (0,), outcome=TrialOutcome.BLOCKED, n=40)
@@ -95,7 +90,3 @@ def test_a_retest_may_take_the_whole_epoch(graph):
     assert graph.most_probable(3) == needs([1], off=[0])
     assert any(way[-1:] == (3,) and 0 in way for way in probes(graph, 2, retest=1.0))
     assert not any(way[-1:] == (3,) and 0 in way for way in probes(graph, 2, curiosity=1.0, least_doubt=0.0))
-
-
-def test_nothing_is_tried_where_nothing_is_doubtful(graph):
-    assert probes(graph, 2, curiosity=1.0, least_doubt=0.5) == {()}
