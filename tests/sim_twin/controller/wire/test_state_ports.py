@@ -139,7 +139,8 @@ def test_a_realtime_package_that_nobody_takes_is_not_made_until_somebody_reads_a
     assert peer.n_skipped
     n_made, n_skipped = len(made), peer.n_skipped
     run(500)
-    assert (len(made), peer.n_skipped) == (n_made, n_skipped + 500)
+    # The kernel's buffers may grow and take a few more: each is made, no other is.
+    assert len(made) - n_made == 500 - (peer.n_skipped - n_skipped) < 100
     slow.until(lambda: not peer.n_unsent)
     run(5)
     assert len(made) == n_made + 5
