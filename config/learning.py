@@ -129,7 +129,7 @@ class Expert(Section, frozen=True, kw_only=True):
     settled_misses: Annotated[int, Meta(ge=0, le=20)] = 1
     """An expert that failed no more often than this in its last 20 trials is left as it is."""
     rate_half: Positive = 20.0
-    """Successes after which the learning rate is half of what it was at first."""
+    """Successes after which the learning rate is half of what it was at first; it rises again while trials fail."""
     scales_m: Annotated[tuple[Span, ...], Meta(max_length=4)] = (0.1, 0.03)
     """Ranges of the exponentials that a distance is normalised by."""
 

@@ -17,8 +17,6 @@ from robot.station import Station
 
 __all__ = ["Agent", "EpochRecord", "GoalJudge", "GoalSelector", "TrialRecord"]
 
-FAIR = 0.5
-"""A try at a goal whose place is reached less than half as often while something holds says nothing against a skill."""
 RETREAT_STEPS = 20
 RISEN_WITHIN_M = 0.012
 
@@ -57,6 +55,10 @@ class GoalJudge(Protocol):
 
     def achieved(self, percept: Percept) -> GoalState:
         """Return which goals hold now."""
+        ...
+
+    def is_hand_free(self, goal: int, percept: Percept) -> bool:
+        """Whether the hand holds nothing but what the goal is about: with another thing in it no try is a fair one."""
         ...
 
     def is_at_place(self, goal: int, percept: Percept) -> bool:
@@ -209,7 +211,7 @@ class Agent:
         self._stopwatch.lap("selectors")
         predicted = self.experts.utility(subgoal, scene.percept)
         skill = self.experts.skill(subgoal)
-        is_fair = self.subgoal_selector.freedom(subgoal, holds) >= FAIR
+        is_fair = self.judge.is_hand_free(subgoal, scene.percept)
         self.experts.begin_trial(subgoal, scene.percept, explore=explore)
         outcome, n_steps = self._pursue(station, scene, subgoal)
         self.experts.end_trial(outcome, is_fair=is_fair)

@@ -60,8 +60,7 @@ class GoalJudge:
         place where nothing happened. A hand that moves, or holds something else, is not free: it proves nothing.
         """
         wanted = self._goals[goal]
-        held = self.held(percept)
-        if percept.grip.is_moving or (held is not None and held != wanted.object):
+        if percept.grip.is_moving or not self.is_hand_free(goal, percept):
             return False
         if wanted.kind is GoalKind.IN_BOX:
             return self._is_at_box(wanted, percept)
@@ -74,6 +73,10 @@ class GoalJudge:
             return is_near
         is_held_up = tool[2] > thing.position_m[2] + self._tops_m[thing.name] + ABOVE_M
         return is_held_up and (is_near or self._shares_a_box(thing.position_m, tool, percept))
+
+    def is_hand_free(self, goal: int, percept: Percept) -> bool:
+        """Whether the hand holds nothing, or what the goal is about: with another thing in it no try is a fair one."""
+        return self.held(percept) in (None, self._goals[goal].object)
 
     def held(self, percept: Percept) -> str | None:
         """Return the name of the object between the jaws of a hand that reports one."""

@@ -81,10 +81,6 @@ class SubgoalSelector(Kept, Protocol):
         """Learn from one trial. Void attempts change nothing."""
         ...
 
-    def freedom(self, goal: int, holds: GoalState) -> float:
-        """Return how fair a try at a goal is, in [0, 1]: less where what holds was seen to keep the arm away."""
-        ...
-
     def changed_goals(self) -> tuple[int, ...]:
         """Return the goals for which what they are believed to need was revised by the last update."""
         ...

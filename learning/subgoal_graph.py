@@ -98,10 +98,6 @@ class GraphSelector:
             counted = 1.0 if self.graph.beliefs[attempt.subgoal].was_achieved else NOVICE
             self._failures[at] = self._failures.get(at, 0.0) + counted
 
-    def freedom(self, goal: int, holds: GoalState) -> float:
-        """Return how fair a try at a goal is: less where what holds was seen to keep the arm from its place."""
-        return self.graph.freedom(goal, Situation(mask(holds), mask(holds)))
-
     def changed_goals(self) -> tuple[int, ...]:
         """Return the goals for which what they need, directly or not, was revised by the last update."""
         return self._changed

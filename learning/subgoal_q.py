@@ -64,11 +64,6 @@ class QSelector:
         if transition is not None:
             self._learn(transition, goals=(attempt.goal,))
 
-    def freedom(self, goal: int, holds: GoalState) -> float:
-        """Return 1: nothing is known of what keeps the arm from a place."""
-        del goal, holds
-        return 1.0
-
     def changed_goals(self) -> tuple[int, ...]:
         """Return nothing: a table of Q-values does not say what changed."""
         return ()

@@ -106,16 +106,14 @@ class Idle(ToyExperts):
         return super().act(percept).__class__(heading_rad=0.0, distance_m=0.0, height_m=0.05)
 
 
-class Asking(Sequence):
-    """Says how fair a try is, by what holds; records what it is asked."""
+class HandFull(ToyJudge):
+    """A hand that holds something, which one goal is about."""
 
-    def __init__(self, *subgoals, fair):
-        super().__init__(*subgoals)
-        self.fair, self.asked = fair, []
+    def __init__(self, goal):
+        self.about = goal
 
-    def freedom(self, goal, holds):
-        self.asked.append((goal, holds))
-        return self.fair
+    def is_hand_free(self, goal, percept):
+        return goal == self.about
 
 
 class Told(Idle):
@@ -305,16 +303,10 @@ def test_the_goal_selector_hears_of_every_epoch_but_void_ones():
     assert len(agent.goal_selector.ended) == 1
 
 
-def test_experts_hear_whether_what_holds_left_them_a_fair_try():
-    for fair, expected in ((1.0, True), (0.5, True), (0.49, False)):
-        selector, experts = Asking(2, fair=fair), Told(np.random.default_rng(0))
-        agent = Agent(
-            goal_selector=FixedGoal(2), subgoal_selector=selector, experts=experts, judge=ToyJudge(),
-            protocol=Experiment(trials=1),
-        )  # fmt: skip
-        learn(agent)
-        assert experts.told == [expected]
-        assert selector.asked == [(2, (False,) * N_GOALS)]
+def test_experts_hear_whether_what_the_hand_holds_left_them_a_fair_try():
+    experts = Told(np.random.default_rng(0))
+    learn(agent_for(2, (2, 1, 2), experts=experts, judge=HandFull(2), trials=3))
+    assert experts.told == [True, False, True]
 
 
 def test_prediction_and_skill_are_said_before_the_trial():

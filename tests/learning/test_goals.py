@@ -93,6 +93,12 @@ def test_a_hand_that_moves_or_holds_something_else_proves_nothing(judge):
     assert not judge.is_at_place(RED_GRABBED, percept(grip=FULL, **over_red, **holding_blue))
 
 
+def test_a_hand_is_free_for_a_goal_if_it_holds_nothing_else(judge):
+    holding_blue = percept(tool=(0.54, 0.25, 0.2), grip=FULL, blue_cylinder=(0.54, 0.25, 0.2))
+    assert [judge.is_hand_free(goal, holding_blue) for goal in range(6)] == [False] * 4 + [True] * 2
+    assert all(judge.is_hand_free(goal, percept()) for goal in range(6))
+
+
 def test_over_a_box_held_up_with_or_without_the_object_is_at_its_place(judge):
     assert judge.is_at_place(IN_BOX, percept(tool=(0.59, 0.03, 0.1), contact=True))
     carrying = {"blue_cylinder": (0.59, 0.03, 0.105)}

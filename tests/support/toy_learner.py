@@ -139,6 +139,9 @@ class ToyJudge:
     def achieved(self, percept: Percept) -> GoalState:
         return tuple(lamp > 0.5 for lamp in percept.button_states)
 
+    def is_hand_free(self, goal: int, percept: Percept) -> bool:
+        return True
+
     def is_at_place(self, goal: int, percept: Percept) -> bool:
         return percept.distances_m[goal] < TOUCH_M
 
@@ -189,9 +192,6 @@ class ToySubgoalSelector:
 
     def predict_allowed(self, goal: int, state: GoalState) -> float:
         return float(self._verdicts.get(_key(goal, state), True))
-
-    def freedom(self, goal: int, holds: GoalState) -> float:
-        return 1.0
 
     def changed_goals(self) -> tuple[int, ...]:
         return ()
