@@ -10,8 +10,8 @@ import typer
 
 from learning.errors import LearningError
 from learning.metrics import EraSummary
-from learning.report import Run, load_run
-from learning.run_folder import RunFolder, run_folders
+from learning.report import Run, load_runs
+from learning.run_folder import RunFolder
 from robot.bench import BenchReport, BenchResult, bench_report
 
 __all__ = ["bench_learning", "learning_results"]
@@ -22,22 +22,29 @@ TRIALS_GOAL, SUCCESS_GOAL = 0.2, 0.98
 
 
 def bench_learning(*, full: bool, run: Path | None = None) -> BenchReport:
-    """Return the figures of a run folder, or of all runs in a folder; nothing is learnt here, full or not."""
+    """Return the figures of a run folder, or of all runs in a folder; nothing is learnt here, full or not.
+
+    Runs in a folder that cannot be read are named and left out, and make a row that misses its goal.
+    """
     del full
     started_s = perf_counter()
     try:
-        runs = [load_run(folder) for folder in run_folders(run or _newest())]
+        loaded = load_runs([run or _newest()])
     except LearningError as error:
         raise typer.BadParameter(str(error), param_hint="RUN") from error
-    return bench_report("learning", learning_results(runs), seconds=perf_counter() - started_s)
+    for line in loaded.lines():
+        typer.echo(line, err=True)
+    results = learning_results(loaded.runs, n_left_out=len(loaded.left_out))
+    return bench_report("learning", results, seconds=perf_counter() - started_s)
 
 
-def learning_results(runs: Sequence[Run]) -> list[BenchResult]:
+def learning_results(runs: Sequence[Run], *, n_left_out: int = 0) -> list[BenchResult]:
     """Return the rows: medians over runs, goals asked of the worst run. What was not reached is not a number."""
     firsts = [run.summary.eras[0] for run in runs if run.summary.eras]
     laters = [era for run in runs for era in run.summary.eras[1:]]
     return [
         _row("runs", [float(len(runs))], "runs"),
+        _row("runs_left_out", [float(n_left_out)], "runs", at_most=0),
         _row("epoch_all_goals", [era.learnt_after for era in firsts], "epochs", at_most=LEARN_GOAL),
         _row("epochs_to_recover", [era.learnt_after for era in laters], "epochs", at_most=RECOVER_GOAL),
         _row(

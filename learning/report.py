@@ -10,13 +10,15 @@ import msgspec
 from learning.errors import RunFolderError
 from learning.metrics import EraSummary, Summary, summarise
 from learning.rows import EvaluationRow, GoalRow
-from learning.run_folder import Manifest, RunFolder, run_folders
+from learning.run_folder import Manifest, RunFolder
+from learning.run_search import find_runs
 
 __all__ = [
     "Count",
     "EraReport",
     "Group",
     "GroupReport",
+    "Loaded",
     "Report",
     "Run",
     "Spread",
@@ -37,6 +39,23 @@ class Run(msgspec.Struct, frozen=True, kw_only=True):
     goal_rows: tuple[GoalRow, ...]
     evaluation_rows: tuple[EvaluationRow, ...]
     summary: Summary
+
+
+class Loaded(msgspec.Struct, frozen=True, kw_only=True):
+    """Runs read back, and what could not be."""
+
+    runs: tuple[Run, ...]
+    left_out: tuple[str, ...]
+    """Of each run that cannot be read, what is wrong with it, in a line."""
+    passed_over: tuple[str, ...]
+    """Of each folder beside them that is no run's but holds something of one, what it holds, in a line."""
+
+    def lines(self) -> list[str]:
+        """Return in words what was not read, a line each."""
+        return [
+            *(f"error: left out: {reason}" for reason in self.left_out),
+            *(f"passed over: {note}" for note in self.passed_over),
+        ]
 
 
 class Group(msgspec.Struct, frozen=True, kw_only=True):
@@ -137,28 +156,29 @@ def _refuse_strange(path: Path, rows: Sequence[GoalRow | EvaluationRow], n_goals
             raise RunFolderError(f"{path}: line {i}: expected a goal from 0 to {n_goals - 1}, got {row.goal}")
 
 
-def load_runs(paths: Sequence[Path]) -> tuple[list[Run], list[str]]:
+def load_runs(paths: Sequence[Path]) -> Loaded:
     """Return the runs that paths name, run folders and folders of them, in order.
 
     Inside a folder of runs those that cannot be read are left out.
-
-    Returns:
-        The runs, and of each that was left out what is wrong with it, in a line.
 
     Raises:
         RunFolderError: a path names no run, or is itself the folder of a run that cannot be read.
     """
     runs: list[Run] = []
     damaged: list[str] = []
+    passed_over: list[str] = []
     for path in paths:
-        for folder in run_folders(path):
+        found = find_runs(path)
+        damaged += found.broken
+        passed_over += found.passed_over
+        for folder in found.folders:
             try:
                 runs.append(load_run(folder))
             except RunFolderError as error:
                 if folder.path == path:
                     raise
                 damaged.append(str(error))
-    return runs, damaged
+    return Loaded(runs=tuple(runs), left_out=tuple(damaged), passed_over=tuple(passed_over))
 
 
 def group_runs(runs: Sequence[Run]) -> list[Group]:

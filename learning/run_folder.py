@@ -16,7 +16,7 @@ from learning.errors import RunFolderError
 from learning.rows import EvaluationRow, GoalRow, GraphRow, TrialRow, read_rows
 from learning.time_spent import TimeSpent
 
-__all__ = ["FORMAT", "GoalInfo", "Manifest", "RunFolder", "run_folders"]
+__all__ = ["CONFIG_NAME", "FORMAT", "MANIFEST_NAME", "PROFILE_NAME", "GoalInfo", "Manifest", "RunFolder"]
 
 FORMAT = 1
 CONFIG_NAME = "config.yaml"
@@ -207,22 +207,6 @@ class RunFolder:
             self.path.rmdir()
         self._lock.close()
         self._lock = None
-
-
-def run_folders(path: Path) -> list[RunFolder]:
-    """Return the run folder that a path names, or those inside it in order of their names.
-
-    Raises:
-        RunFolderError: there is none.
-    """
-    folder = RunFolder(path)
-    if folder.holds_run():
-        return [folder]
-    inside = [RunFolder(entry) for entry in sorted(path.iterdir()) if entry.is_dir()] if path.is_dir() else []
-    found = [entry for entry in inside if entry.holds_run()]
-    if not found:
-        raise RunFolderError(f"{path}: expected a run folder or a folder of run folders, found no run.json")
-    return found
 
 
 def _damage(path: Path, raw: bytes, error: Exception) -> str:
