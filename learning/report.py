@@ -75,11 +75,12 @@ class Count(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Spread(msgspec.Struct, frozen=True, kw_only=True):
-    """Median and range over the runs that have a figure."""
+    """Median and range over the runs that have a figure: n of so many. None of the three where none has."""
 
-    median: float
-    least: float
-    greatest: float
+    median: float | None
+    least: float | None
+    greatest: float | None
+    n: int
     of: int
 
 
@@ -87,18 +88,21 @@ class EraReport(msgspec.Struct, frozen=True, kw_only=True):
     """One set of rules over all runs of a group."""
 
     from_epoch: int
+    n_runs: int
+    """Runs of the group that came to these rules: all that follows is of so many."""
     learnt: Count
-    learnt_after: Spread | None
-    graph_right: Count
-    graph_right_after: Spread | None
-    graph_wrong_later: Spread | None
+    learnt_after: Spread
+    graph_right: Count | None
+    """None where no run learns a graph."""
+    graph_right_after: Spread
+    graph_wrong_later: Spread
     """Share of the looks after that at which it was wrong again."""
-    trials_over_optimum: Spread | None
+    trials_over_optimum: Spread
     """Mean over goals."""
-    trials_over_optimum_worst: Spread | None
+    trials_over_optimum_worst: Spread
     """Of the goal that has the most."""
-    trials_over_optimum_of_successes: Spread | None
-    success: Spread | None
+    trials_over_optimum_of_successes: Spread
+    success: Spread
     """Of the least successful goal over an era's last 200 epochs."""
 
 
@@ -219,11 +223,13 @@ def _report_group(group: Group) -> GroupReport:
 
 
 def _report_era(parts: Sequence[EraSummary]) -> EraReport:
+    has_graph = any(part.graph_wrong_last is not None for part in parts)
     return EraReport(
         from_epoch=parts[0].from_epoch,
+        n_runs=len(parts),
         learnt=count(sum(part.learnt_after is not None for part in parts), len(parts)),
         learnt_after=_spread(parts, lambda part: part.learnt_after),
-        graph_right=count(sum(part.graph_right_after is not None for part in parts), len(parts)),
+        graph_right=count(sum(part.graph_right_after is not None for part in parts), len(parts)) if has_graph else None,
         graph_right_after=_spread(parts, lambda part: part.graph_right_after),
         graph_wrong_later=_spread(parts, lambda part: part.graph_wrong_later),
         trials_over_optimum=_spread(parts, lambda part: part.trials_over_optimum),
@@ -233,11 +239,15 @@ def _report_era(parts: Sequence[EraSummary]) -> EraReport:
     )
 
 
-def _spread(parts: Sequence[EraSummary], figure: Callable[[EraSummary], float | None]) -> Spread | None:
+def _spread(parts: Sequence[EraSummary], figure: Callable[[EraSummary], float | None]) -> Spread:
     values = [value for part in parts if (value := figure(part)) is not None]
-    if not values:
-        return None
-    return Spread(median=median(values), least=min(values), greatest=max(values), of=len(values))
+    return Spread(
+        median=median(values) if values else None,
+        least=min(values, default=None),
+        greatest=max(values, default=None),
+        n=len(values),
+        of=len(parts),
+    )
 
 
 def count(n: int, of: int) -> Count:

@@ -92,7 +92,7 @@ class RunFolder:
         """Return what was run.
 
         Raises:
-            RunFolderError: this is no run folder, or one of another format.
+            RunFolderError: this is no run folder, one of another format, or its optima are not of its rules and goals.
         """
         path = self.path / MANIFEST_NAME
         try:
@@ -106,6 +106,7 @@ class RunFolder:
             raise RunFolderError(_damage(path, raw, error)) from error
         if manifest.format != FORMAT:
             raise RunFolderError(f"{path}: expected format {FORMAT}, got {manifest.format}")
+        _refuse_strange_optima(path, manifest)
         return manifest
 
     def time_spent(self) -> TimeSpent:
@@ -217,6 +218,18 @@ def _damage(path: Path, raw: bytes, error: Exception) -> str:
         f"{path}: expected the JSON object that a run begins with, got {got}: bring the file back from a copy, or leave"
         " this run out; its tables are beside it and can be read without"
     )
+
+
+def _refuse_strange_optima(path: Path, manifest: Manifest) -> None:
+    """Refuse optima that are not one of each goal for each set of rules: figures would be of other rules."""
+    n_rules, n_goals = len(manifest.changes) + 1, len(manifest.goals)
+    if len(manifest.optima) != n_rules:
+        raise RunFolderError(
+            f"{path}: expected optima for {n_rules} sets of rules (changes: {n_rules - 1}), got {len(manifest.optima)}"
+        )
+    for i, optima in enumerate(manifest.optima):
+        if len(optima) != n_goals:
+            raise RunFolderError(f"{path}: expected optima of {n_goals} goals in optima[{i}], got {len(optima)}")
 
 
 def _is_left_over(entry: Path) -> bool:
