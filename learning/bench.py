@@ -1,17 +1,18 @@
 """The bench of learning: figures of merit of the newest run, or of the run or sweep given."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from statistics import median
 from time import perf_counter
 
 import typer
+from msgspec import UNSET
 
 from learning.errors import LearningError
-from learning.metrics import EraSummary
-from learning.report import Run, load_run
-from learning.run_folder import RunFolder, run_folders
+from learning.metrics import EraSummary, eras
+from learning.report import Run, load_runs
+from learning.run_folder import RunFolder
 from robot.bench import BenchReport, BenchResult, bench_report
 
 __all__ = ["bench_learning", "learning_results"]
@@ -22,41 +23,57 @@ TRIALS_GOAL, SUCCESS_GOAL = 0.2, 0.98
 
 
 def bench_learning(*, full: bool, run: Path | None = None) -> BenchReport:
-    """Return the figures of a run folder, or of all runs in a folder; nothing is learnt here, full or not."""
+    """Return the figures of a run folder, or of all runs in a folder; nothing is learnt here, full or not.
+
+    Runs in a folder that cannot be read are named and left out, and make a row that misses its goal.
+    """
     del full
     started_s = perf_counter()
     try:
-        runs = [load_run(folder) for folder in run_folders(run or _newest())]
+        loaded = load_runs([run or _newest()])
     except LearningError as error:
         raise typer.BadParameter(str(error), param_hint="RUN") from error
-    return bench_report("learning", learning_results(runs), seconds=perf_counter() - started_s)
+    for line in loaded.lines():
+        typer.echo(line, err=True)
+    results = learning_results(loaded.runs, n_left_out=len(loaded.left_out))
+    return bench_report("learning", results, seconds=perf_counter() - started_s)
 
 
-def learning_results(runs: Sequence[Run]) -> list[BenchResult]:
-    """Return the rows: medians over runs, goals asked of the worst run. What was not reached is not a number."""
-    firsts = [run.summary.eras[0] for run in runs if run.summary.eras]
-    laters = [era for run in runs for era in run.summary.eras[1:]]
+def learning_results(runs: Sequence[Run], *, n_left_out: int = 0) -> list[BenchResult]:
+    """Return the rows: medians over runs, goals asked of the worst run. What was not reached is not a number.
+
+    A median over fewer than all says of how many in its row's details; a set of rules that a run is yet to come to
+    counts as one not reached.
+    """
+    spans = [(run, eras(run.manifest.changes, run.manifest.n_epochs)) for run in runs]
+    reached = [[*run.summary.eras, *[None] * (len(planned) - len(run.summary.eras))] for run, planned in spans]
+    firsts = [era for of_run in reached for era in of_run[:1]]
+    laters = [era for of_run in reached for era in of_run[1:]]
+    every = [*firsts, *laters]
     return [
         _row("runs", [float(len(runs))], "runs"),
-        _row("epoch_all_goals", [era.learnt_after for era in firsts], "epochs", at_most=LEARN_GOAL),
-        _row("epochs_to_recover", [era.learnt_after for era in laters], "epochs", at_most=RECOVER_GOAL),
-        _row(
-            "trials_over_optimum",
-            [era.trials_over_optimum for era in (*firsts, *laters)],
-            "trials",
-            at_most=TRIALS_GOAL,
-        ),
+        _row("runs_left_out", [float(n_left_out)], "runs", at_most=0),
+        _row("epoch_all_goals", _each(firsts, lambda era: era.learnt_after), "epochs", at_most=LEARN_GOAL),
+        _row("epochs_to_recover", _each(laters, lambda era: era.learnt_after), "epochs", at_most=RECOVER_GOAL),
+        _row("trials_over_optimum", _each(every, lambda era: era.trials_over_optimum), "trials", at_most=TRIALS_GOAL),
         _row(
             "trials_over_optimum_worst_goal",
-            [era.trials_over_optimum_worst for era in (*firsts, *laters)],
+            _each(every, lambda era: era.trials_over_optimum_worst),
             "trials",
             at_most=TRIALS_GOAL,
         ),
-        _row("least_success_at_end", [_success(era) for era in (*firsts, *laters)], "share", at_least=SUCCESS_GOAL),
+        _row("least_success_at_end", _each(every, _success), "share", at_least=SUCCESS_GOAL),
         _row("time_steps_to_all", [run.summary.time_steps_to_all for run in runs], "decisions"),
-        _row("graph_right_at_first_epochs", [era.graph_right_after for era in firsts], "epochs"),
-        _row("graph_right_after_epochs", [era.graph_right_after for era in laters], "epochs", at_most=GRAPH_GOAL),
+        _row("graph_right_at_first_epochs", _each(firsts, lambda era: era.graph_right_after), "epochs"),
+        _row(
+            "graph_right_after_epochs", _each(laters, lambda era: era.graph_right_after), "epochs", at_most=GRAPH_GOAL
+        ),
     ]
+
+
+def _each(parts: Sequence[EraSummary | None], figure: Callable[[EraSummary], float | None]) -> list[float | None]:
+    """Return one figure of every set of rules; None of those that were not come to."""
+    return [None if part is None else figure(part) for part in parts]
 
 
 def _success(era: EraSummary) -> float | None:
@@ -82,7 +99,9 @@ def _row(
         ok = is_reached and min(known) >= at_least
     goal = "" if at_most is None else f"<= {at_most:g}"
     goal = goal if at_least is None else f">= {at_least:g}"
-    return BenchResult(name=name, value=median(known) if known else math.nan, unit=unit, goal=goal, ok=ok)
+    few = {"over": f"{len(known)} of {len(values)}"} if len(known) < len(values) else UNSET
+    value = median(known) if known else math.nan
+    return BenchResult(name=name, value=value, unit=unit, goal=goal, ok=ok, details=few)
 
 
 def _newest() -> Path:

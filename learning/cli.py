@@ -1,7 +1,7 @@
 """Commands of the learning room: learn, evaluate, explain, report. The edge: terminal, files and the host's clock."""
 
 import functools
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Annotated, ParamSpec, TypeVar
@@ -166,23 +166,24 @@ def report(
 ) -> None:
     """Draw both panels of the paper's Figure 2 and the curriculum; runs of one learner become median and range.
 
-    Runs inside a folder that cannot be read are named and left out (exit code 1).
+    Runs inside a folder that cannot be read are named and left out (exit code 1); so are folders of something else that
+    hold a file like a run's, and are no fault.
     """
-    loaded, damaged = load_runs(runs)
-    for reason in damaged:
-        typer.echo(f"error: left out: {reason}", err=True)
-    if loaded:
-        _report(loaded, out or _report_folder(loaded, is_whole=not damaged), json=json)
-    if damaged:
+    loaded = load_runs(runs)
+    for line in loaded.lines():
+        typer.echo(line, err=True)
+    if loaded.runs:
+        _report(loaded.runs, out or _report_folder(loaded.runs, is_whole=not loaded.left_out), json=json)
+    if loaded.left_out:
         raise typer.Exit(EXIT_FAILED)
 
 
-def _report_folder(runs: list[Run], *, is_whole: bool) -> Path:
+def _report_folder(runs: Sequence[Run], *, is_whole: bool) -> Path:
     """Return where a report goes that was given no place: into the run where one run was asked for."""
     return RunFolder(Path(runs[0].folder)).figures if is_whole and len(runs) == 1 else Path("report")
 
 
-def _report(runs: list[Run], folder: Path, *, json: bool) -> None:
+def _report(runs: Sequence[Run], folder: Path, *, json: bool) -> None:
     paths = _write_figures(runs, folder)
     groups = group_runs(runs)
     if json:
@@ -193,7 +194,7 @@ def _report(runs: list[Run], folder: Path, *, json: bool) -> None:
         typer.echo(path)
 
 
-def _write_figures(runs: list[Run], folder: Path) -> list[Path]:
+def _write_figures(runs: Sequence[Run], folder: Path) -> list[Path]:
     """Draw the figures of runs, write them and their figures of merit, and return the files."""
     groups = group_runs(runs)
     paths = [

@@ -38,8 +38,8 @@ class Explanation(msgspec.Struct, frozen=True, kw_only=True):
     """The same of attempts before, which other rules may have decided."""
     n_against_before: int
     changed_epoch: int | None
-    """When the most probable conjunction last changed, were it for a moment only: a few misses that put it in doubt,
-    and the next success that brought it back, count as two changes."""
+    """When the most probable conjunction last changed. One that comes back after a doubt in which no other became more
+    probable than not counts as unchanged."""
     skill: float
     plan: tuple[int, ...] | None
     """Goals to achieve one after the other from a fresh table; None where no way is known."""

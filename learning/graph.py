@@ -11,6 +11,7 @@ from config.learning import SubgoalSelection
 from learning.interfaces import Attempt, TrialOutcome
 from learning.planning import Effort, cheapest_plan, relevant_goals
 from learning.preconditions import START, Belief, Evidence, Kind, Needs, Situation, mask
+from learning.revisions import Revisions
 
 __all__ = ["Finding", "Graph", "situation_of"]
 
@@ -64,7 +65,7 @@ class Graph:
         self._tried = np.zeros((2, n_goals, n_goals))
         self._reached = np.zeros((2, n_goals, n_goals))
         """[h, i, j]: of the attempts at goal i while goal j held (h = 1) or did not, how many came to the place."""
-        self._changed_epoch: list[int | None] = [None] * n_goals
+        self._revisions = Revisions(self.beliefs)
         self._log = tuple(deque[Evidence](maxlen=N_EVIDENCE) for _ in range(n_goals))
         self._last: list[Evidence | None] = [None] * n_goals
 
@@ -101,9 +102,7 @@ class Graph:
             self._log[goal].append(evidence)
         self._last[goal] = evidence
         expected = belief.update(evidence, block_hit=self._block_hit(attempt.skill), weight=weight)
-        is_revised = self.most_probable(goal) != before
-        if is_revised:
-            self._changed_epoch[goal] = attempt.epoch
+        is_revised = self._revisions.note(goal, belief, attempt.epoch)
         return Finding(
             goal=goal, situation=situation_of(attempt), expected=expected, believed=before, is_revised=is_revised
         )
@@ -229,8 +228,11 @@ class Graph:
         return tuple(self._log[goal])
 
     def changed_epoch(self, goal: int) -> int | None:
-        """Return the epoch in which a goal's most probable needs last changed; None where they never did."""
-        return self._changed_epoch[goal]
+        """Return the epoch in which a goal's most probable needs last changed; None where they never did.
+
+        Needs that come back after a doubt in which no others took hold have their old epoch again.
+        """
+        return self._revisions.epoch(goal)
 
     def state_dict(self) -> dict[str, Any]:
         """Return everything learnt."""
@@ -241,13 +243,13 @@ class Graph:
             "lost": self._lost.copy(),
             "tried": self._tried.copy(),
             "reached": self._reached.copy(),
-            "changed_epoch": list(self._changed_epoch),
+            "revisions": self._revisions.state_dict(),
             "log": [[_plain(evidence) for evidence in kept] for kept in self._log],
             "last": [None if evidence is None else _plain(evidence) for evidence in self._last],
         }
 
     def load_state_dict(self, state: dict[str, Any]) -> None:
-        """Restore bit for bit."""
+        """Restore bit for bit; of a state that was kept before doubts were told from changes, as far as it goes."""
         for belief, loaded in zip(self.beliefs, state["beliefs"], strict=True):
             belief.load_state_dict(loaded)
         self._skill = list(state["skill"])
@@ -255,7 +257,10 @@ class Graph:
         self._lost = np.array(state["lost"], dtype=float)
         self._tried = np.array(state["tried"], dtype=float)
         self._reached = np.array(state["reached"], dtype=float)
-        self._changed_epoch = list(state["changed_epoch"])
+        if "revisions" in state:
+            self._revisions.load_state_dict(state["revisions"])
+        else:
+            self._revisions.begin(self.beliefs, state["changed_epoch"])
         for kept, loaded in zip(self._log, state["log"], strict=True):
             kept.clear()
             kept.extend(msgspec.convert(loaded, list[Evidence]))

@@ -192,7 +192,7 @@ def summarise(
         n_goals: How many goals there are.
         n_trials: Trials that an epoch has.
         changes: Epochs at which the rules changed.
-        optima: Least trials of each goal, one sequence an era.
+        optima: Least trials of each goal, one sequence a set of rules; a run may not have come to all.
     """
     n_epochs = len(goal_rows)
     spans = eras(changes, n_epochs) if n_epochs else []

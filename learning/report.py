@@ -10,13 +10,15 @@ import msgspec
 from learning.errors import RunFolderError
 from learning.metrics import EraSummary, Summary, summarise
 from learning.rows import EvaluationRow, GoalRow
-from learning.run_folder import Manifest, RunFolder, run_folders
+from learning.run_folder import Manifest, RunFolder
+from learning.run_search import find_runs
 
 __all__ = [
     "Count",
     "EraReport",
     "Group",
     "GroupReport",
+    "Loaded",
     "Report",
     "Run",
     "Spread",
@@ -39,6 +41,23 @@ class Run(msgspec.Struct, frozen=True, kw_only=True):
     summary: Summary
 
 
+class Loaded(msgspec.Struct, frozen=True, kw_only=True):
+    """Runs read back, and what could not be."""
+
+    runs: tuple[Run, ...]
+    left_out: tuple[str, ...]
+    """Of each run that cannot be read, what is wrong with it, in a line."""
+    passed_over: tuple[str, ...]
+    """Of each folder beside them that is no run's but holds something of one, what it holds, in a line."""
+
+    def lines(self) -> list[str]:
+        """Return in words what was not read, a line each."""
+        return [
+            *(f"error: left out: {reason}" for reason in self.left_out),
+            *(f"passed over: {note}" for note in self.passed_over),
+        ]
+
+
 class Group(msgspec.Struct, frozen=True, kw_only=True):
     """Runs of one learner on one scenario; they differ by seed."""
 
@@ -56,11 +75,12 @@ class Count(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Spread(msgspec.Struct, frozen=True, kw_only=True):
-    """Median and range over the runs that have a figure."""
+    """Median and range over the runs that have a figure: n of so many. None of the three where none has."""
 
-    median: float
-    least: float
-    greatest: float
+    median: float | None
+    least: float | None
+    greatest: float | None
+    n: int
     of: int
 
 
@@ -68,18 +88,21 @@ class EraReport(msgspec.Struct, frozen=True, kw_only=True):
     """One set of rules over all runs of a group."""
 
     from_epoch: int
+    n_runs: int
+    """Runs of the group that came to these rules: all that follows is of so many."""
     learnt: Count
-    learnt_after: Spread | None
-    graph_right: Count
-    graph_right_after: Spread | None
-    graph_wrong_later: Spread | None
+    learnt_after: Spread
+    graph_right: Count | None
+    """None where no run learns a graph."""
+    graph_right_after: Spread
+    graph_wrong_later: Spread
     """Share of the looks after that at which it was wrong again."""
-    trials_over_optimum: Spread | None
+    trials_over_optimum: Spread
     """Mean over goals."""
-    trials_over_optimum_worst: Spread | None
+    trials_over_optimum_worst: Spread
     """Of the goal that has the most."""
-    trials_over_optimum_of_successes: Spread | None
-    success: Spread | None
+    trials_over_optimum_of_successes: Spread
+    success: Spread
     """Of the least successful goal over an era's last 200 epochs."""
 
 
@@ -137,28 +160,29 @@ def _refuse_strange(path: Path, rows: Sequence[GoalRow | EvaluationRow], n_goals
             raise RunFolderError(f"{path}: line {i}: expected a goal from 0 to {n_goals - 1}, got {row.goal}")
 
 
-def load_runs(paths: Sequence[Path]) -> tuple[list[Run], list[str]]:
+def load_runs(paths: Sequence[Path]) -> Loaded:
     """Return the runs that paths name, run folders and folders of them, in order.
 
     Inside a folder of runs those that cannot be read are left out.
-
-    Returns:
-        The runs, and of each that was left out what is wrong with it, in a line.
 
     Raises:
         RunFolderError: a path names no run, or is itself the folder of a run that cannot be read.
     """
     runs: list[Run] = []
     damaged: list[str] = []
+    passed_over: list[str] = []
     for path in paths:
-        for folder in run_folders(path):
+        found = find_runs(path)
+        damaged += found.broken
+        passed_over += found.passed_over
+        for folder in found.folders:
             try:
                 runs.append(load_run(folder))
             except RunFolderError as error:
                 if folder.path == path:
                     raise
                 damaged.append(str(error))
-    return runs, damaged
+    return Loaded(runs=tuple(runs), left_out=tuple(damaged), passed_over=tuple(passed_over))
 
 
 def group_runs(runs: Sequence[Run]) -> list[Group]:
@@ -199,11 +223,13 @@ def _report_group(group: Group) -> GroupReport:
 
 
 def _report_era(parts: Sequence[EraSummary]) -> EraReport:
+    has_graph = any(part.graph_wrong_last is not None for part in parts)
     return EraReport(
         from_epoch=parts[0].from_epoch,
+        n_runs=len(parts),
         learnt=count(sum(part.learnt_after is not None for part in parts), len(parts)),
         learnt_after=_spread(parts, lambda part: part.learnt_after),
-        graph_right=count(sum(part.graph_right_after is not None for part in parts), len(parts)),
+        graph_right=count(sum(part.graph_right_after is not None for part in parts), len(parts)) if has_graph else None,
         graph_right_after=_spread(parts, lambda part: part.graph_right_after),
         graph_wrong_later=_spread(parts, lambda part: part.graph_wrong_later),
         trials_over_optimum=_spread(parts, lambda part: part.trials_over_optimum),
@@ -213,11 +239,15 @@ def _report_era(parts: Sequence[EraSummary]) -> EraReport:
     )
 
 
-def _spread(parts: Sequence[EraSummary], figure: Callable[[EraSummary], float | None]) -> Spread | None:
+def _spread(parts: Sequence[EraSummary], figure: Callable[[EraSummary], float | None]) -> Spread:
     values = [value for part in parts if (value := figure(part)) is not None]
-    if not values:
-        return None
-    return Spread(median=median(values), least=min(values), greatest=max(values), of=len(values))
+    return Spread(
+        median=median(values) if values else None,
+        least=min(values, default=None),
+        greatest=max(values, default=None),
+        n=len(values),
+        of=len(parts),
+    )
 
 
 def count(n: int, of: int) -> Count:

@@ -16,7 +16,7 @@ from learning.errors import RunFolderError
 from learning.rows import EvaluationRow, GoalRow, GraphRow, TrialRow, read_rows
 from learning.time_spent import TimeSpent
 
-__all__ = ["FORMAT", "GoalInfo", "Manifest", "RunFolder", "run_folders"]
+__all__ = ["CONFIG_NAME", "FORMAT", "MANIFEST_NAME", "PROFILE_NAME", "GoalInfo", "Manifest", "RunFolder"]
 
 FORMAT = 1
 CONFIG_NAME = "config.yaml"
@@ -92,7 +92,7 @@ class RunFolder:
         """Return what was run.
 
         Raises:
-            RunFolderError: this is no run folder, or one of another format.
+            RunFolderError: this is no run folder, one of another format, or its optima are not of its rules and goals.
         """
         path = self.path / MANIFEST_NAME
         try:
@@ -106,6 +106,7 @@ class RunFolder:
             raise RunFolderError(_damage(path, raw, error)) from error
         if manifest.format != FORMAT:
             raise RunFolderError(f"{path}: expected format {FORMAT}, got {manifest.format}")
+        _refuse_strange_optima(path, manifest)
         return manifest
 
     def time_spent(self) -> TimeSpent:
@@ -209,22 +210,6 @@ class RunFolder:
         self._lock = None
 
 
-def run_folders(path: Path) -> list[RunFolder]:
-    """Return the run folder that a path names, or those inside it in order of their names.
-
-    Raises:
-        RunFolderError: there is none.
-    """
-    folder = RunFolder(path)
-    if folder.holds_run():
-        return [folder]
-    inside = [RunFolder(entry) for entry in sorted(path.iterdir()) if entry.is_dir()] if path.is_dir() else []
-    found = [entry for entry in inside if entry.holds_run()]
-    if not found:
-        raise RunFolderError(f"{path}: expected a run folder or a folder of run folders, found no run.json")
-    return found
-
-
 def _damage(path: Path, raw: bytes, error: Exception) -> str:
     """Return what is wrong with a manifest, and what to try."""
     is_cut = "truncated" in str(error)
@@ -233,6 +218,18 @@ def _damage(path: Path, raw: bytes, error: Exception) -> str:
         f"{path}: expected the JSON object that a run begins with, got {got}: bring the file back from a copy, or leave"
         " this run out; its tables are beside it and can be read without"
     )
+
+
+def _refuse_strange_optima(path: Path, manifest: Manifest) -> None:
+    """Refuse optima that are not one of each goal for each set of rules: figures would be of other rules."""
+    n_rules, n_goals = len(manifest.changes) + 1, len(manifest.goals)
+    if len(manifest.optima) != n_rules:
+        raise RunFolderError(
+            f"{path}: expected optima for {n_rules} sets of rules (changes: {n_rules - 1}), got {len(manifest.optima)}"
+        )
+    for i, optima in enumerate(manifest.optima):
+        if len(optima) != n_goals:
+            raise RunFolderError(f"{path}: expected optima of {n_goals} goals in optima[{i}], got {len(optima)}")
 
 
 def _is_left_over(entry: Path) -> bool:

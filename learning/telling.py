@@ -47,7 +47,10 @@ def _era_line(era: EraSummary, *, is_first: bool) -> str:
 
 
 def report_table(report: Report) -> Table:
-    """Return a table of all groups and sets of rules: how many learnt over its 95 % interval, median over range."""
+    """Return a table of all groups and sets of rules: how many learnt over its 95 % interval, median over range.
+
+    Where not every run of a group has a figure, or came to a set of rules, the cell says how many did.
+    """
     table = Table(
         box=box.SIMPLE_HEAD,
         pad_edge=False,
@@ -61,10 +64,10 @@ def report_table(report: Report) -> Table:
         for era in group.eras:
             table.add_row(
                 Text(group.name),
-                str(era.from_epoch),
+                f"{era.from_epoch}{_share_of_runs(era.n_runs, len(group.seeds))}",
                 _count(era.learnt),
                 _spread(era.learnt_after, "{:.0f}"),
-                _spread(era.graph_right_after, "{:.0f}"),
+                "–" if era.graph_right is None else _spread(era.graph_right_after, "{:.0f}"),
                 _spread(era.trials_over_optimum, "{:.2f}"),
                 _spread(era.trials_over_optimum_worst, "{:.2f}"),
                 _spread(era.success, "{:.0%}"),
@@ -145,10 +148,15 @@ def _count(count: Count) -> str:
     return f"{count.n}/{count.of}\n{100 * count.share_low:.0f}–{count.share_high:.0%}"
 
 
-def _spread(spread: Spread | None, form: str) -> str:
-    if spread is None:
-        return "–"
+def _spread(spread: Spread, form: str) -> str:
+    few = _share_of_runs(spread.n, spread.of)
+    if spread.median is None or spread.least is None or spread.greatest is None:
+        return f"–{few}"
     middle = form.format(spread.median)
-    if spread.of == 1:
-        return middle
-    return f"{middle}\n{form.format(spread.least).removesuffix('%')}–{form.format(spread.greatest)}"
+    if spread.n == 1:
+        return f"{middle}{few}"
+    return f"{middle}\n{form.format(spread.least).removesuffix('%')}–{form.format(spread.greatest)}{few}"
+
+
+def _share_of_runs(n: int, of: int) -> str:
+    return "" if n == of else f"\n{n} of {of}\nruns"

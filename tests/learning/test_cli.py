@@ -205,6 +205,29 @@ def test_a_damaged_run_in_a_folder_of_runs_is_named_and_left_out_of_the_report(t
     assert "bring the file back from a copy" in lines(done)[0]
 
 
+def test_the_bench_names_what_it_leaves_out_and_passes_over_and_judges_the_rest(tmp_path):
+    for name, seed in (("a", 5), ("b", 6), ("c", 7)):
+        make_toy_folder(tmp_path / "sweep" / name, seed=seed)
+    (tmp_path / "sweep" / "a" / "goals.csv").write_text("epoch\n")
+    (tmp_path / "sweep" / "b" / "config.yaml").unlink()
+    assert autotelic("report", tmp_path / "sweep" / "c", "--out", tmp_path / "sweep" / "report").exit_code == 0
+    benched = autotelic("bench", "learning", tmp_path / "sweep", "--json")
+    reported = autotelic("report", tmp_path / "sweep", "--out", tmp_path / "out")
+    assert [line.split(": expected")[0] for line in lines(benched)] == [
+        f"error: left out: {tmp_path / 'sweep' / 'b'}",
+        f"error: left out: {tmp_path / 'sweep' / 'a' / 'goals.csv'}",
+        f"passed over: {tmp_path / 'sweep' / 'report'}: holds summary.json, but no run",
+    ]
+    assert lines(reported) == lines(benched)
+    assert (benched.exit_code, reported.exit_code) == (1, 1)
+    rows = {row["name"]: row for row in json.loads(benched.stdout)["results"]}
+    assert (rows["runs"]["value"], rows["runs_left_out"]["value"], rows["runs_left_out"]["ok"]) == (1, 2, False)
+    alone = json.loads(autotelic("bench", "learning", tmp_path / "sweep" / "c", "--json").stdout)["results"]
+    assert [row for row in alone if not row["name"].startswith("runs")] == [
+        row for name, row in rows.items() if not name.startswith("runs")
+    ]
+
+
 def test_a_folder_of_damaged_runs_only_is_reported_run_by_run_and_draws_nothing(tmp_path):
     for name in ("a", "b"):
         make_toy_folder(tmp_path / "sweep" / name)

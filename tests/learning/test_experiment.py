@@ -6,13 +6,15 @@ import subprocess
 import sys
 from pathlib import Path
 
+import msgspec
 import pytest
 
 from learning.errors import TooManyVoidEpochsError
 from learning.interfaces import TrialOutcome
 from learning.metrics import optimal_trials, summarise
 from learning.rows import EvaluationRow, GoalRow, GraphRow, TrialRow, read_rows
-from tests.support.toy_learner import CHANGE_EPOCH, N_GOALS, toy_allowed
+from learning.seeds import reset_seed
+from tests.support.toy_learner import CHANGE_EPOCH, N_GOALS, ToyStation, toy_allowed
 from tests.support.toy_run import FILES, PROTOCOL, ToyRun, files_of
 
 KILLED_AT = (40_000, 150_000, 171_313, 203_777, 255_001)
@@ -137,6 +139,26 @@ def test_void_epochs_teach_nothing_and_too_many_running_fail_the_run(tmp_path):
     many = ToyRun(tmp_path / "many", PROTOCOL, seed=5, void_epochs=tuple(range(20, 120)))
     with pytest.raises(TooManyVoidEpochsError, match="10 epochs running"):
         many.go()
+
+
+class LatchesWhenTested(ToyStation):
+    """One station for learning and testing, cut short in every test epoch and in no other."""
+
+    def reset(self, *, seed, epoch):
+        self._void_epochs = () if seed == reset_seed(5, epoch) else (epoch,)
+        return super().reset(seed=seed, epoch=epoch)
+
+
+def test_a_latch_in_a_test_on_the_learners_own_station_counts_as_the_tests_alone(whole, tmp_path):
+    protocol = msgspec.structs.replace(PROTOCOL, void_limit=2)
+    assert ToyRun(tmp_path, protocol, seed=5, station=LatchesWhenTested()).go() == 120
+    mine, theirs = files_of(tmp_path), files_of(whole)
+    assert [name for name in FILES if mine[name] != theirs[name]] == ["evaluations.csv"]
+    goals, rows = read_rows(tmp_path / "goals.csv", GoalRow), read_rows(tmp_path / "evaluations.csv", EvaluationRow)
+    changes, best = (CHANGE_EPOCH,), optima()
+    told = summarise(goals, rows, [], n_goals=N_GOALS, n_trials=PROTOCOL.trials, changes=changes, optima=best)
+    assert told.n_void_epochs == 0
+    assert [(row.n_tests, row.n_void, row.success) for row in rows] == [(0, 20, 0.0)] * len(rows)
 
 
 def test_void_epochs_running_are_counted_across_a_stop(tmp_path):

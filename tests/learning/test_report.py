@@ -1,6 +1,7 @@
 """Runs side by side: figures of merit by hand, and pictures that hold what they should."""
 
 import io
+import json
 import math
 
 import msgspec
@@ -12,7 +13,7 @@ from learning.errors import RunFolderError
 from learning.figures import curriculum_figure, performance_figure, save, styles
 from learning.report import Report, count, group_runs, load_run, report_of
 from learning.telling import report_table, summary_lines
-from tests.support.toy_folder import make_toy_folder, toy_manifest
+from tests.support.toy_folder import make_started_toy_folder, make_toy_folder, toy_manifest
 
 
 @pytest.fixture(scope="module")
@@ -54,6 +55,25 @@ def test_a_colour_that_is_none_is_refused_in_words(tmp_path):
         load_run(folder)
 
 
+@pytest.mark.parametrize(
+    ("change", "told"),
+    [
+        (lambda tree: tree["optima"].pop(), r"expected optima for 2 sets of rules \(changes: 1\), got 1"),
+        (lambda tree: tree["optima"].append(tree["optima"][0]), r"expected optima for 2 sets of rules .*, got 3"),
+        (lambda tree: tree["changes"].append(90), r"expected optima for 3 sets of rules \(changes: 2\), got 2"),
+        (lambda tree: tree["optima"][1].pop(), r"expected optima of 4 goals in optima\[1\], got 3"),
+    ],
+)
+def test_optima_that_are_not_of_the_runs_rules_and_goals_are_refused_in_words(tmp_path, change, told):
+    folder = make_started_toy_folder(tmp_path)
+    manifest = tmp_path / "run.json"
+    tree = json.loads(manifest.read_text())
+    change(tree)
+    manifest.write_text(json.dumps(tree))
+    with pytest.raises(RunFolderError, match=rf"run\.json: {told}$"):
+        load_run(folder)
+
+
 def with_manifest(run, **changes):
     return msgspec.structs.replace(run, manifest=msgspec.structs.replace(run.manifest, **changes))
 
@@ -92,7 +112,53 @@ def test_figures_over_runs_are_median_and_range(runs):
     assert (era.learnt_after.median, era.learnt_after.least, era.learnt_after.greatest) == (20, 10, 30)
     assert (era.learnt.n, era.learnt.of) == (2, 2)
     never = report_of(group_runs([with_era(first, 0, learnt_after=None), second])).groups[0].eras[0]
-    assert (never.learnt.n, never.learnt.of, never.learnt_after.of) == (1, 2, 1)
+    assert (never.learnt.n, never.learnt.of, never.learnt_after.n, never.learnt_after.of) == (1, 2, 1, 2)
+
+
+def cells(report, heading):
+    """Return what a column of the report's table holds, a string a row."""
+    (column,) = (column for column in report_table(report).columns if str(column.header).startswith(heading))
+    return [str(cell) for cell in column.cells]
+
+
+def test_a_figure_of_fewer_than_all_runs_says_of_how_many_in_table_and_json(runs):
+    first, second, third = (
+        with_era(msgspec.structs.replace(runs[0], folder=str(i)), 0, graph_right_after=after, learnt_after=20)
+        for i, after in enumerate((10, 30, None))
+    )
+    report = report_of(group_runs([first, second, third]))
+    told = json.loads(msgspec.json.encode(report))["groups"][0]["eras"][0]
+    assert told["graph_right_after"] == {"median": 20.0, "least": 10, "greatest": 30, "n": 2, "of": 3}
+    assert (told["graph_right"]["n"], told["graph_right"]["of"], told["learnt_after"]["n"]) == (2, 3, 3)
+    assert (cells(report, "graph")[0], cells(report, "after")[0]) == ("20\n10–30\n2 of 3\nruns", "20\n20–20")
+    never = report_of(group_runs([with_era(run, 0, graph_right_after=None) for run in (first, second, third)]))
+    told = json.loads(msgspec.json.encode(never))["groups"][0]["eras"][0]
+    assert told["graph_right_after"] == {"median": None, "least": None, "greatest": None, "n": 0, "of": 3}
+    assert cells(never, "graph")[0] == "–\n0 of 3\nruns"
+    slow = report_of(group_runs([first, second, with_era(third, 0, graph_right_after=40, learnt_after=None)]))
+    assert (cells(slow, "graph")[0], cells(slow, "after")[0]) == ("30\n10–40", "20\n20–20\n2 of 3\nruns")
+
+
+def test_a_learner_without_a_graph_has_none_that_was_never_right(runs):
+    without = [with_era(run, 0, graph_right_after=None, graph_wrong_last=None) for run in runs[:2]]
+    report = report_of(group_runs(without))
+    assert report.groups[0].eras[0].graph_right is None
+    assert cells(report, "graph")[0] == "–"
+
+
+def test_runs_that_are_yet_to_come_to_a_set_of_rules_are_told(runs):
+    summary = runs[1].summary
+    early = msgspec.structs.replace(runs[1], summary=msgspec.structs.replace(summary, eras=summary.eras[:1]))
+    report = report_of(group_runs([runs[0], early]))
+    assert [(era.from_epoch, era.n_runs) for era in report.groups[0].eras] == [(0, 2), (60, 1)]
+    assert cells(report, "rules") == ["0", "60\n1 of 2\nruns"]
+    rows = {row.name: row for row in learning_results([runs[0], early])}
+    assert (rows["epochs_to_recover"].ok, rows["epochs_to_recover"].details) == (False, {"over": "1 of 2"})
+    assert rows["epoch_all_goals"].details is msgspec.UNSET
+    begun = msgspec.structs.replace(early, summary=msgspec.structs.replace(summary, eras=()))
+    assert {row.name: row for row in learning_results([runs[0], begun])}["epoch_all_goals"].details == {
+        "over": "1 of 2"
+    }
 
 
 def test_wilsons_interval_of_five_in_five_and_none_in_ten():
@@ -165,5 +231,5 @@ def test_bench_rows_ask_the_goal_of_the_worst_run(runs):
     assert not {row.name: row for row in learning_results(slow)}["epochs_to_recover"].ok
     never = [*good[:2], with_era(good[2], 1, graph_right_after=None)]
     row = {row.name: row for row in learning_results(never)}["graph_right_after_epochs"]
-    assert (row.value, row.ok) == (30, False)
+    assert (row.value, row.ok, row.details) == (30, False, {"over": "2 of 3"})
     assert math.isnan({row.name: row for row in learning_results([])}["epoch_all_goals"].value)

@@ -8,7 +8,7 @@ import pytest
 from config.loader import resolve
 from config.resolved import dump_resolved
 from learning.errors import RunFolderError
-from learning.run_folder import RunFolder, run_folders
+from learning.run_folder import RunFolder
 from learning.wanted import Wanted, refuse_another, resolve_wanted
 from tests.support.small_lab import RULES, SCENARIO
 from tests.support.toy_folder import toy_manifest
@@ -87,17 +87,6 @@ def test_what_is_no_run_folder_is_told(tmp_path):
     (tmp_path / "run.json").write_bytes(msgspec.json.encode(manifest))
     with pytest.raises(RunFolderError, match="expected format 1, got 99"):
         RunFolder(tmp_path).manifest()
-
-
-def test_a_folder_of_runs_stands_for_its_runs(tmp_path):
-    for name in ("b", "a"):
-        started(tmp_path / name)
-    (tmp_path / "notes").mkdir()
-    assert [folder.path.name for folder in run_folders(tmp_path)] == ["a", "b"]
-    assert [folder.path.name for folder in run_folders(tmp_path / "b")] == ["b"]
-    for path in (tmp_path / "notes", tmp_path / "absent"):
-        with pytest.raises(RunFolderError, match="expected a run folder"):
-            run_folders(path)
 
 
 def test_judged_runs_evaluate_densely_and_epochs_may_be_given():

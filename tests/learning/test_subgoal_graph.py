@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 
 from config.learning import SubgoalSelection
+from learning.checkpoint import decode, encode
 from learning.curiosity import most_hopeful_step
+from learning.explain import explain_graph
 from learning.graph import Graph
 from learning.interfaces import Attempt, TrialOutcome
 from learning.preconditions import START, Needs, Situation, conjunctions
@@ -285,6 +287,70 @@ def test_the_epoch_of_the_last_revision_is_remembered():
     g.learn(trial(3, (1,), epoch=9))
     g.learn(trial(3, (1,), epoch=30))
     assert 7 <= g.changed_epoch(3) <= 9
+
+
+def doubted():
+    """Return a graph that held "1 needs 0" since epoch 7 and doubts it since epoch 20.
+
+    Goal 1 has the hypotheses {}, {0 on}, {0 off}, a third each. Blocked with nothing on: (0.05, 0.98, 0.05) / 1.08.
+    Achieved so, with nothing known of the skill: (0.05 / 2, 0.98 * 0.02, 0.05 / 2) / 0.0696 = (0.36, 0.28, 0.36).
+    """
+    g = Graph(n_goals=2, config=SubgoalSelection(hazard=0.0, literal_cost=0.0, false_positive=0.02, blocked_error=0.05))
+    g.learn(trial_of_two(BLOCKED, epoch=7))
+    assert (g.most_probable(1), g.changed_epoch(1)) == (needs([0]), 7)
+    assert g.beliefs[1].confidence == pytest.approx(0.98 / 1.08)
+    g.learn(trial_of_two(ACHIEVED, epoch=20))
+    assert (g.most_probable(1), g.changed_epoch(1)) == (needs(), 20)
+    assert g.beliefs[1].confidence == pytest.approx(0.025 / 0.0696)
+    return g
+
+
+def trial_of_two(outcome, *, epoch, is_on=False):
+    """Return a trial at goal 1 of two, with goal 0 on or not."""
+    return Attempt(
+        epoch=epoch, goal=1, subgoal=1, state=(is_on, False), state_after=(is_on, outcome is ACHIEVED),
+        outcome=outcome, predicted=0.5, skill=0.95, n_steps=10,
+    )  # fmt: skip
+
+
+def test_a_belief_that_comes_back_after_a_doubt_has_its_old_epoch_again():
+    g = doubted()
+    # Blocked once more: (0.025 * 0.05, 0.0196 * 0.98, 0.025 * 0.05), nine tenths for "0 on".
+    findings = g.learn(trial_of_two(BLOCKED, epoch=21))
+    assert [finding.is_revised for finding in findings] == [True]
+    assert (g.most_probable(1), g.changed_epoch(1)) == (needs([0]), 7)
+    told = explain_graph(g)[1]
+    assert (told.n_for, told.n_against, told.n_for_before, told.n_against_before) == (2, 1, 0, 0)
+
+
+def test_a_belief_that_comes_back_after_another_took_hold_has_changed():
+    g = doubted()
+    # Achieved with goal 0 on: (0.025 * 2 / 3, 0.0196 / 2, 0.025 * 0.02) / 0.02697, six tenths for "nothing".
+    g.learn(trial_of_two(ACHIEVED, epoch=30, is_on=True))
+    assert g.beliefs[1].confidence == pytest.approx((0.05 / 3.0) / (0.05 / 3.0 + 0.0098 + 0.0005))
+    assert (g.most_probable(1), g.changed_epoch(1)) == (needs(), 20)
+    g.learn(trial_of_two(BLOCKED, epoch=31))
+    assert (g.most_probable(1), g.changed_epoch(1)) == (needs([0]), 31)
+
+
+def test_what_was_doubted_is_kept_through_a_checkpoint():
+    g, other = doubted(), Graph(n_goals=2, config=SubgoalSelection(hazard=0.0, literal_cost=0.0))
+    kept = encode(g.state_dict())
+    other.load_state_dict(decode(kept))
+    assert encode(other.state_dict()) == kept
+    g, again = doubted(), doubted()
+    again.load_state_dict(decode(kept))
+    for one in (g, again):
+        one.learn(trial_of_two(BLOCKED, epoch=21))
+    assert again.changed_epoch(1) == 7
+    assert encode(again.state_dict()) == encode(g.state_dict())
+
+
+def test_a_checkpoint_from_before_doubts_were_told_from_changes_can_be_read():
+    state, again = doubted().state_dict(), Graph(n_goals=2, config=SubgoalSelection())
+    del state["revisions"]
+    again.load_state_dict(state | {"changed_epoch": [None, 20]})
+    assert (again.changed_epoch(0), again.changed_epoch(1)) == (None, 20)
 
 
 def test_a_graph_of_one_goal_works():

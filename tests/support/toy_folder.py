@@ -6,10 +6,11 @@ from config.loader import resolve
 from config.resolved import dump_resolved
 from learning.metrics import optimal_trials
 from learning.run_folder import GoalInfo, Manifest, RunFolder
+from learning.tables import Tables
 from tests.support.toy_learner import CHANGE_EPOCH, N_GOALS, toy_allowed
 from tests.support.toy_run import PROTOCOL, ToyRun
 
-__all__ = ["COLOURS", "make_toy_folder", "toy_manifest"]
+__all__ = ["COLOURS", "make_started_toy_folder", "make_toy_folder", "toy_manifest"]
 
 COLOURS = ((0.95, 0.5, 0.08), (0.12, 0.35, 0.85), (0.10, 0.20, 0.75), (0.10, 0.20, 0.75))
 KINDS = ("pressed", "pressed", "grabbed", "in_box")
@@ -43,4 +44,13 @@ def make_toy_folder(path: Path, *, seed=0, learner="toy") -> RunFolder:
     with folder:
         folder.start(toy_manifest(seed=seed, learner=learner), dump_resolved(resolve()))
         ToyRun(path, PROTOCOL, seed=seed).go()
+    return folder
+
+
+def make_started_toy_folder(path: Path) -> RunFolder:
+    """Return a folder in which a run was begun and has not done an epoch."""
+    folder = RunFolder(path)
+    with folder:
+        folder.start(toy_manifest(), dump_resolved(resolve()))
+        Tables(path).close()
     return folder

@@ -24,14 +24,16 @@ FILES = ("trials.csv", "goals.csv", "graphs.csv", "evaluations.csv", "newest che
 class ToyRun:
     """A run folder, a toy learner, and the experiment between them."""
 
-    def __init__(self, folder: Path, protocol: Protocol, *, seed=0, n_workers=0, resume=False, void_epochs=()):
+    def __init__(
+        self, folder: Path, protocol: Protocol, *, seed=0, n_workers=0, resume=False, void_epochs=(), station=None
+    ):
         self.folder = folder
         self.said: list[str] = []
         self.kill_workers_at: int | None = None
         self._n_epochs = 0
         self._seed, self._protocol = seed, protocol
         self._n_workers, self._void_epochs = n_workers, void_epochs
-        self._resume = resume
+        self._resume, self._station = resume, station
 
     # The watcher's door.
 
@@ -52,11 +54,12 @@ class ToyRun:
         store = CheckpointStore(self.folder / "checkpoints")
         state = store.newest()[0] if self._resume else None
         learner = make_toy_learner(self._seed, self._protocol, self._void_epochs)
+        station = self._station or learner.station
         tester = make_toy_learner(self._seed, self._protocol, self._void_epochs)
         maker = toy_maker(self._seed, self._protocol, self._void_epochs)
         self._pool = EvaluationPool(
             tester=tester.agent,
-            station=learner.station,
+            station=station,
             make_learner=maker,
             n_workers=self._n_workers,
             report=self.said.append,
@@ -65,7 +68,7 @@ class ToyRun:
             experiment = Experiment(
                 plan=Plan(seed=self._seed, protocol=self._protocol, changes=(CHANGE_EPOCH,)),
                 agent=learner.agent,
-                station=learner.station,
+                station=station,
                 pool=self._pool,
                 tables=tables,
                 store=store,
