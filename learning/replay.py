@@ -26,14 +26,6 @@ class Replay:
         self._next = (self._next + len(x)) % len(self.x)
         self.n = min(len(self.x), self.n + len(x))
 
-    def keep(self, is_kept: Array) -> None:
-        """Forget the other rows.  is_kept (n,) bool"""
-        if is_kept.all():
-            return
-        k = int(is_kept.sum())
-        self.x[:k], self.y[:k] = self.x[: self.n][is_kept], self.y[: self.n][is_kept]
-        self.n = self._next = k
-
     def state_dict(self) -> dict[str, Any]:
         """Return the rows held."""
         return {"x": self.x[: self.n].copy(), "y": self.y[: self.n].copy(), "next": self._next}

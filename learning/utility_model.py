@@ -1,8 +1,8 @@
 """One expert: the utility model of one goal, "the probability of reaching it modulated by the achieved utility".
 
-A success leaves a trace along which utility falls linearly from 1 at its end; a failure leaves its tail at 0, until a
-success comes by there. A small network is fitted to both, with smaller steps the more successes there were, and with
-larger ones while it fails. Two things make few traces enough:
+A success leaves a trace along which utility falls linearly from 1 at its end; a failure leaves its tail at 0. A small
+network is fitted to both, with smaller steps the more successes there were, and with larger ones while it fails. Two
+things make few traces enough:
 
 * relevance: a distance that is nearly the same at every success is what the goal is about; inputs are weighted by how
   steady their distance was, so that the rest cannot be mistaken for a cause;
@@ -32,8 +32,6 @@ FLOOR_STD_M = 0.006
 WINDOW = 20
 """Trials of the running success."""
 LOSS_BEND = 0.1
-SAME_PLACE = 0.2
-"""Places no further apart than this, weighted and normalised, are one."""
 RETRAINED = 10
 """Trials' worth of training with new weights, once a model is past its first successes."""
 
@@ -117,28 +115,15 @@ class UtilityModel:
         return (sum(self._recent) + 0.2) / (len(self._recent) + 1.0)
 
     def succeed(self, trace: Array, end_m: Array, *, is_own: bool) -> None:
-        """Take in a trace that ended in success: normalised P's (k, n_inputs) and the distances at its end (n,).
-
-        Failures at places that it came by are forgotten: they are worth what the success says.
-        """
+        """Take in a trace that ended in success: normalised P's (k, n_inputs) and the distances at its end (n,)."""
         self.n_successes += 1
         rows = trace[-self._config.trace :]
         if is_own:
             start = float(self.rate(trace[:1])[0])
             self._usual_start += 0.1 * (start - self._usual_start)
-        self._failures.keep(~self._is_passed(self._failures.x[: self._failures.n], rows))
         self._successes.add(rows, trace_utilities(len(rows), self._config.horizon))
         self._ends_m = [*self._ends_m[-(N_ENDS - 1) :], end_m.tolist()]
         self._weigh()
-
-    def _is_passed(self, places: Array, trace: Array) -> Array:
-        """Tell which places a trace came by, whatever the lamps.  (k, n_inputs), (l, n_inputs) -> (k,)"""
-        if not len(places) or not len(trace):
-            return np.zeros(len(places), dtype=bool)
-        m = len(self.weights) - self._n_states
-        a, b = (x[:, :m] * self.weights[:m] for x in (places, trace))
-        apart = np.einsum("ij,ij->i", a, a)[:, None] + np.einsum("ij,ij->i", b, b) - 2.0 * a @ b.T
-        return apart.min(axis=1) < SAME_PLACE**2
 
     def _weigh(self) -> None:
         """Tell relevance anew while successes are few, later at every twentieth success where the model fails.

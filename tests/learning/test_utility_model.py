@@ -120,25 +120,6 @@ def test_only_a_model_that_fails_is_given_new_weights_however_seldom_it_is_tried
     assert (weights_of(model)[0] != trained).any() == changes
 
 
-def failures_of(model: UtilityModel) -> np.ndarray:
-    return model.state_dict()["failures"]["x"]
-
-
-def test_a_failure_counts_until_a_success_comes_by_the_same_place_whatever_the_lamps():
-    # Seen on the twin: from beside a button seldom pressed before, 59 failures outvoted 25 steps of successes.
-    model, rng = taught(make()), np.random.default_rng(7)
-    x, end = approach(rng)
-    elsewhere = normalised(np.full((5, 3), 0.8), np.array([0.0]), SCALES_M)
-    there = x[5:10].copy()
-    there[:, -1] = 1.0
-    model.fail(np.concatenate([elsewhere, there]))
-    assert len(failures_of(model)) == 10
-    model.succeed(x, end, is_own=True)
-    assert failures_of(model).tolist() == elsewhere.tolist()
-    model.fail(there)
-    assert len(failures_of(model)) == 10
-
-
 def moved_by_training(model: UtilityModel) -> float:
     before = [w.copy() for w in weights_of(model)]
     model.train()
