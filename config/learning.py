@@ -122,6 +122,10 @@ class Expert(Section, frozen=True, kw_only=True):
     boredom: NonNegative = 0.004
     """Utility taken off places like those of the trial's steps, for each; more where nothing moved."""
     boredom_sigma: Positive = 0.05
+    lamps_drawn: Share = 0.5
+    """Share of a batch in which lamps are drawn at random, and whether they are in failures; 0 leaves it out."""
+    detour: Annotated[int, Meta(ge=0, le=1000)] = 15
+    """Time steps for which curiosity leads a model away that is stuck, while learning; 0 leaves it where it is."""
     horizon: Count = 70
     """Steps over which utility falls from 1 to 0 along a success trace."""
     failure_share: Share = 0.3

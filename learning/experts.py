@@ -28,12 +28,11 @@ FIRST_TRUST = 0.3
 """Share of trials in which a model moves the arm after its first success; it rises to 1 when it is established."""
 STUCK_STEPS = 9
 STUCK_M = 0.004
-"""A model that let no distance change by more than this in so many steps is stuck."""
-DETOUR_STEPS = 15
+"""A model is stuck where every distance is within this of what it was at the first of so many steps."""
 REST_STEPS = 10
-"""Steps of a trial, and after a detour, before a model can count as stuck."""
+"""More steps than these must be done, of a trial or after a detour, before a model can count as stuck."""
 STILL_STEPS = 5
-"""Nothing moves when no distance changed by more than STUCK_M in so many steps."""
+"""Nothing moves where every distance is within STUCK_M of what it was at the first of so many steps."""
 REMEMBER_EVERY = 4
 
 
@@ -97,7 +96,7 @@ class ExpertSet:
         """Return the next intent."""
         states = np.array(percept.button_states, dtype=np.float32)
         self._note_stillness(percept)
-        if self._is_learning and self._is_by_model:
+        if self._is_learning and self._is_by_model and self._config.detour:
             self._note_stuck()
         self._is_by_curiosity = not self._is_by_model or self._detour > 0
         if not self._is_by_curiosity:
@@ -128,7 +127,7 @@ class ExpertSet:
         self._n_still = self._n_still + 1 if is_still else 0
 
     def _change(self, n_steps: int) -> float:
-        """Return the greatest change of a distance between now and so many steps ago, infinite if that is too early."""
+        """Return the greatest change of a distance since the first of the last steps, infinite if that is too early."""
         if len(self._distances_m) < n_steps:
             return np.inf
         return float(np.abs(self._distances_m[-1] - self._distances_m[-n_steps]).max())
@@ -141,8 +140,8 @@ class ExpertSet:
         self._was_stuck = True
         self._dead_ends.append(np.array(self._trace[-STUCK_STEPS:]))
         self._trace = self._trace[-1:]
-        self._detour = DETOUR_STEPS
-        self._rested_at = self._n_steps + DETOUR_STEPS + REST_STEPS
+        self._detour = self._config.detour
+        self._rested_at = self._n_steps + self._config.detour + REST_STEPS
         self._curiosity.begin()
 
     def observe(self, result: StepResult, achieved: GoalState) -> None:

@@ -185,10 +185,9 @@ class UtilityModel:
         bad = self._rng.integers(0, max(1, self._failures.n), n_failed)
         x = np.concatenate([self._successes.x[good], self._failures.x[bad]]) * self.weights
         y = np.concatenate([self._successes.y[good], self._failures.y[bad]])
-        m = self._n_states
-        if m:
-            half = n // 2
-            x[:half, -m:] = self._rng.integers(0, 2, (half, m))
+        m, drawn = self._n_states, round(config.lamps_drawn * n)
+        if m and drawn:
+            x[:drawn, -m:] = self._rng.integers(0, 2, (drawn, m))
             x[n - n_failed :, -m:] = self._rng.integers(0, 2, (n_failed, m))
         return x, y, n_failed
 

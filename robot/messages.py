@@ -61,6 +61,8 @@ class ArmMode(StrEnum):
     RUNNING = "running"
     STOPPED = "stopped"
     PROTECTIVE_STOP = "protective_stop"
+    SAFEGUARD_STOP = "safeguard_stop"
+    SAFETY_FAULT = "safety_fault"
     EMERGENCY_STOP = "emergency_stop"
 
 

@@ -37,7 +37,10 @@ _SAFETY_BITS = (
     (7, "emergency stop"), (8, "safety violation"), (9, "safety fault"), (10, "stopped due to safety"), (3, "recovery"),
 )  # fmt: skip
 _EMERGENCY = 1 << 5 | 1 << 6 | 1 << 7
-_STOPPED = 1 << 2 | 1 << 3 | 1 << 4 | 1 << 8 | 1 << 9 | 1 << 10
+_FAULT = 1 << 8 | 1 << 9
+_SAFEGUARD = 1 << 4
+_STOPPED = 1 << 2 | 1 << 3 | 1 << 10
+"""Bit 10 stands beside that of every stop; alone it is the least that can be said."""
 
 
 class Runtime:
@@ -57,9 +60,13 @@ class UrStatus(msgspec.Struct, frozen=True, kw_only=True):
 
 
 def mode_of(robot_mode: int, safety_bits: int) -> ArmMode:
-    """Return our mode for the controller's."""
+    """Return our mode for the controller's: of several stops the one that takes most to release."""
     if safety_bits & _EMERGENCY:
         return ArmMode.EMERGENCY_STOP
+    if safety_bits & _FAULT:
+        return ArmMode.SAFETY_FAULT
+    if safety_bits & _SAFEGUARD:
+        return ArmMode.SAFEGUARD_STOP
     if safety_bits & _STOPPED:
         return ArmMode.PROTECTIVE_STOP
     if robot_mode == RUNNING:

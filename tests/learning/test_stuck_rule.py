@@ -19,9 +19,9 @@ STILL = Heading(heading_rad=0.0, distance_m=0.0, height_m=0.1)
 class Scripted:
     """Trials at goal 0 in which every distance is as a script says, whatever is asked."""
 
-    def __init__(self) -> None:
+    def __init__(self, **expert) -> None:
         self.table = KinematicTable(load_scenario("paper"))
-        config = LearningConfig(name="test", expert=Expert(established_after=1))
+        config = LearningConfig(name="test", expert=Expert(established_after=1, **expert))
         self.experts = ExpertSet(config, self.table.spec, n_goals=N_GOALS, rng=np.random.default_rng(2))
         self.led_away([0.3] * 5, outcome=TrialOutcome.ACHIEVED)
 
@@ -71,3 +71,7 @@ def test_it_is_stuck_as_soon_as_the_last_move_lies_eight_steps_back(scripted):
 
 def test_a_hand_at_work_is_not_stuck(scripted):
     assert scripted.led_away([0.3] * 30, moving=range(1, 20))[:1] == [20]
+
+
+def test_without_a_detour_it_is_left_where_it_is():
+    assert Scripted(detour=0).led_away([0.3] * 60) == []

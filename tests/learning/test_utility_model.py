@@ -69,6 +69,26 @@ def test_lamps_have_no_say_where_success_did_not_depend_on_them():
     assert abs(off - on) < 0.05
 
 
+def test_lamps_have_a_say_where_none_are_drawn():
+    # Every success with the lamp out, every failure with it lit: without drawing, that is the reason.
+    told = {}
+    for lamps_drawn in (0.0, 0.5):
+        config, rng = Expert(hidden=(32, 32), lamps_drawn=lamps_drawn), np.random.default_rng(5)
+        model = UtilityModel(config, n_distances=3, n_states=1, rng=np.random.default_rng(0))
+        for _ in range(12):
+            x, end = approach(rng)
+            model.succeed(x, end, is_own=True)
+            lit = x.copy()
+            lit[:, -1] = 1.0
+            model.fail(lit)
+            model.train()
+        place = np.array([[0.05, 0.2, 0.3]])
+        off, on = (model.rate(normalised(place, np.array([s]), SCALES_M))[0] for s in (0.0, 1.0))
+        told[lamps_drawn] = off - on
+    assert told[0.0] > 0.3
+    assert abs(told[0.5]) < 0.1
+
+
 def test_chance_is_a_probability_before_and_after_learning():
     x = normalised(np.array([[0.2, 0.3, 0.1]]), np.array([0.0]), SCALES_M)[0]
     assert make().chance(x) == pytest.approx(0.2)
