@@ -35,7 +35,9 @@ class ScriptNameError(ScriptError):
     """
 
     def __init__(self, name: str, *, line: int, column: int) -> None:
-        super().__init__(f"line {line}, column {column}: '{name}' is not defined, neither in the program nor built in")
+        super().__init__(
+            f"line {line}, column {column}: '{name}' is not defined in the program, nor built in at this version"
+        )
         self.line = line
         self.column = column
         self.as_reported = f"compile_error_name_not_found:{name}:"

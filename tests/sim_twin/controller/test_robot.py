@@ -53,7 +53,8 @@ def test_an_emergency_stop_takes_the_power_and_is_recovered_from_by_hand():
 def test_torques_move_a_joint_and_then_it_is_held():
     robot = started(
         "def f():\n i = 0\n while i < 100:\n  direct_torque([0, 0, 0, 0, 0, 0])\n  i = i + 1\n end\n"
-        " while i < 150:\n  direct_torque([8, 0, 0, 0, 0, 0])\n  i = i + 1\n end\nend\n"
+        " while i < 150:\n  direct_torque([8, 0, 0, 0, 0, 0])\n  i = i + 1\n end\nend\n",
+        version=ControllerVersion(minor=23),
     )
     q = robot.machine.world.data.qpos
     start = q[:6].copy()
