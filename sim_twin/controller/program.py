@@ -119,7 +119,11 @@ class Programs:
         fault = program.interpreter.error
         if fault is not None:
             self._machine.journal.exception(
-                program=program.name or UNNAMED, thread=fault.thread, line=fault.line, column=0, message=fault.message
+                program=program.name or UNNAMED,
+                thread=fault.thread,
+                line=fault.line,
+                column=fault.column,
+                message=fault.message,
             )
         core = self._machine.drive.core
         core.tail = None
@@ -146,7 +150,7 @@ class Programs:
                 program=program.name,
                 thread=fault.thread,
                 line=fault.line,
-                column=0,
+                column=fault.column,
                 message=fault.message,
                 as_reported=f"{SECONDARY}{fault.message}",
             )

@@ -44,7 +44,7 @@ class ScriptNameError(ScriptError):
 
 
 class ScriptRuntimeError(ScriptError):
-    """The running script did what a robot stops for; the interpreter knows the line."""
+    """The running script did what a robot stops for; the interpreter knows the place."""
 
 
 class ScriptFault(msgspec.Struct, frozen=True, kw_only=True):
@@ -52,10 +52,12 @@ class ScriptFault(msgspec.Struct, frozen=True, kw_only=True):
 
     Attributes:
         message: What was expected and what came.
-        line: The line that was being executed.
+        line: Where the statement that was being executed begins.
+        column: Where on that line, counted from one.
         thread: The name of the thread that executed it; the program's own name for its main thread.
     """
 
     message: str
     line: int
+    column: int
     thread: str

@@ -15,7 +15,8 @@ def test_a_program_that_fails_tells_its_line_on_the_primary_port():
     robot = started("def f():\n sync()\n movej([1, 2])\nend\n")
     ended(robot)
     assert any("program f, thread f, line 3" in line for line in lines(robot))
-    assert any(b"movej" in message for message in robot.machine.journal.outbox)
+    said = [message for message in robot.machine.journal.outbox if b"movej" in message]
+    assert [message.split(b"movej")[0][-8:] for message in said] == [struct.pack(">II", 3, 2)]
 
 
 def test_a_text_that_does_not_parse_is_reported_and_harms_nothing():
@@ -56,7 +57,9 @@ def test_a_secondary_program_that_fails_says_so_as_a_robot_does():
     robot = make_robot()
     robot.submit_script("sec side():\n set_digital_out(99, True)\nend\n")
     run(robot, 3)
-    assert b"SECONDARY_PROGRAM_EXCEPTION_XXXset_digital_out(): expected" in robot.machine.journal.outbox[-1]
+    place = struct.pack(">II", 2, 2)
+    words = b"SECONDARY_PROGRAM_EXCEPTION_XXXset_digital_out(): expected"
+    assert place + words in robot.machine.journal.outbox[-1]
 
 
 def test_a_sec_that_takes_time_is_reported():
