@@ -4,6 +4,7 @@ import math
 
 import pytest
 
+from sim_twin.controller.compiling import InlineCompiler, ThreadCompiler
 from sim_twin.controller.states import Event, RuntimeState, SafetyMode
 from sim_twin.controller.wire import Outcome
 from tests.support.virtual_robot import FOREVER, ended, lines, make_robot, run, started, state_of
@@ -67,20 +68,54 @@ def test_the_dashboard_plays_pauses_and_stops_what_is_loaded():
     robot = make_robot()
     robot.programs.shelf["/programs/a.urp"] = FOREVER
     panel = robot.panel
-    assert panel.play() is Outcome.FAILED
+    assert panel.play()() is Outcome.FAILED
     assert panel.load("/programs/b.urp") is Outcome.NOT_FOUND
     assert panel.load("/programs/a.urp") is Outcome.DONE
-    assert panel.play() is Outcome.DONE
+    awaited = panel.play()
+    assert awaited() is None
     run(robot, 3)
+    assert awaited() is Outcome.DONE
     assert panel.status().program_state == "PLAYING"
     assert panel.pause() is Outcome.DONE
     run(robot, 3)
     assert state_of(robot) is PAUSED
-    assert panel.play() is Outcome.DONE
+    assert panel.play()() is Outcome.DONE
     run(robot, 3)
     assert state_of(robot) is PLAYING
     assert panel.stop() is Outcome.DONE
     ended(robot)
+
+
+@pytest.mark.parametrize("text", ["def f():\n if\nend\n", "def f():\n nobody()\nend\n"], ids=["syntax", "name"])
+@pytest.mark.parametrize("compiler", [InlineCompiler, ThreadCompiler])
+def test_play_fails_where_the_program_does_not_compile(text, compiler):
+    robot = make_robot(compiler=compiler)
+    robot.programs.shelf["/programs/a.urp"] = text
+    robot.panel.load("/programs/a.urp")
+    awaited = robot.panel.play()
+    assert awaited() is None
+    run(robot, 5000, awaited)
+    assert awaited() is Outcome.FAILED
+    assert state_of(robot) is STOPPED
+    robot.close()
+
+
+def test_play_fails_where_the_arm_is_stopped_before_the_program_begins():
+    robot = make_robot()
+    robot.programs.shelf["/programs/a.urp"] = FOREVER
+    robot.panel.load("/programs/a.urp")
+    awaited = robot.panel.play()
+    robot.programs.handle(Event.PROTECTIVE_STOP)
+    run(robot, 3)
+    assert awaited() is Outcome.FAILED
+
+
+def test_play_fails_where_another_program_comes_before_it_has_begun():
+    robot = started(FOREVER)
+    first, second = robot.programs.submit(FOREVER), robot.programs.submit(FOREVER)
+    assert (first.has_begun, second.has_begun) == (None, None)
+    run(robot, 10)
+    assert (first.has_begun, second.has_begun) == (False, True)
 
 
 def test_local_control_refuses_programs():
