@@ -1,11 +1,10 @@
 """A UR5e over RTDE: the genuine ur_rtde client behind the Arm door. PolyScope 5.
 
-Connecting reads only: the receive and dashboard clients. The control client uploads a script and stops whatever program
-runs, so it is made by `engage`, after somebody has armed. It never outlives a stop or a stale state, because it would
-go on by itself where it was left: it repeats a command after a reconnection, and the script acts on the registers' last
-values. Whoever wants to move again makes a new one, by `engage`. Where the link was lost the client is not even told to
-stop, for any word to it may make it reconnect: the controller's watchdog stops the arm, and the process has to end. A
-guard sees to that where nobody ticks: between engaging and the first command, and while the arm is stopped.
+Connecting reads only: the receive and dashboard clients. The control client stops whatever program runs and never
+outlives a stop or a stale state (robot/hal/rtde_command.py): whoever wants to move makes a new one, by `engage`, after
+somebody has armed. Where the link was lost the client is not even told to stop, for any word to it may make it
+reconnect: the controller's watchdog stops the arm, and the process has to end. A guard sees to that where nobody ticks:
+between engaging and the first command, and while the arm is stopped.
 """
 
 from collections.abc import Sequence
@@ -13,7 +12,6 @@ from contextlib import suppress
 from time import monotonic_ns
 
 from dashboard_client import DashboardClient
-from rtde_control import RTDEControlInterface
 from rtde_receive import RTDEReceiveInterface
 
 from config.arm import ArmConfig
@@ -24,17 +22,11 @@ from robot.hal.pins import Pins
 from robot.hal.protocols import Clock
 from robot.hal.robotiq import GripScale, RobotiqGripper
 from robot.hal.rtde_clock import RtdeClock
+from robot.hal.rtde_command import ALL_BITS, RATE_HZ, Readers, RtdeCommand
 from robot.hal.rtde_links import RtdeLinks
-from robot.hal.rtde_outputs import N_OUTPUTS, DigitalOutputs
-from robot.hal.rtde_set_up import (
-    arm_watchdog,
-    end_program,
-    prove_watchdog,
-    require,
-    set_tool,
-    status_of,
-)
-from robot.hal.ur_calls import bounded, named
+from robot.hal.rtde_outputs import N_OUTPUTS
+from robot.hal.rtde_set_up import require, status_of
+from robot.hal.ur_calls import named
 from robot.hal.ur_checks import check_facts, check_pose, check_serial
 from robot.hal.ur_primary import read_facts
 from robot.hal.ur_state import Runtime, UrStatus, check_ready, check_version, mode_of, parse_version, why_refused
@@ -42,7 +34,6 @@ from robot.messages import ArmCommand, ArmMode, ArmSpec, ArmState, GripState, Ve
 
 __all__ = ["RtdeArm"]
 
-RATE_HZ = 500.0
 FIELDS = (
     "timestamp", "actual_q", "actual_qd", "actual_TCP_pose", "actual_TCP_force", "actual_digital_input_bits",
     "actual_digital_output_bits", "robot_mode", "runtime_state", "safety_status_bits", "target_speed_fraction",
@@ -55,8 +46,6 @@ WRITE_NS = 35_000_000
 """A command that took longer was no mere sending: the client may have reconnected in it, which takes 40 ms at least."""
 STOP_RAD_S2, REST_S, STILL_RAD_S = 10.0, 1.0, 0.01
 START_S = 2.0
-TAKE_S = 8.0
-"""Longer than the client takes to be made, or to give up. One that lost its link meanwhile may wait for ever."""
 
 
 class RtdeArm:
@@ -87,13 +76,14 @@ class RtdeArm:
         self._arm, self._expected_serial = arm, serial
         self._receive: RTDEReceiveInterface | None = None
         self._dashboard: DashboardClient | None = None
-        self._control: RTDEControlInterface | None = None
-        self._outputs: DigitalOutputs | None = None
         self._gripper = RobotiqGripper(GripScale.of(arm.tool))
         self._last_timestamp, self._seen_ns, self._polled_ns = -1.0, 0, 0
         self._pins = Pins(cell)
         self.links = RtdeLinks(address)
         """Who may end this process is set on them."""
+        self._command = RtdeCommand(
+            address=address, tool=arm.tool, links=self.links, pins=self._pins, readers=self._reading
+        )
         self._runtime = Runtime.STOPPED
         """As the last state read told."""
         self._modes, self._mode = (-1, 0), mode_of(-1, 0)
@@ -140,9 +130,9 @@ class RtdeArm:
         """
         if self.links.is_lost:
             raise StaleStateError("arm: expected a process that never lost its link; end this one and start another")
-        if self._control is not None:
+        if self._command.control is not None:
             return
-        receive, dashboard = self._reading()
+        _, dashboard = self._reading()
         with named("dashboard", self.address):
             is_remote = bool(dashboard.isInRemoteControl())
         check_ready(self.status(), is_remote=is_remote)
@@ -153,11 +143,11 @@ class RtdeArm:
             check_ready(self.status(), is_remote=is_remote)  # somebody may have begun something meanwhile
         try:
             with named("RTDE control", self.address):
-                self._take_command(receive)
+                self._command.take(self.clock)
         except BaseException:
             # An arm that was set up by half is nobody's: the next engage begins anew.
             self._require_link()
-            self._drop_control(is_in_traceback=True)
+            self._command.drop(self.clock, is_in_traceback=True)
             raise
 
     # ------------------------------------------------------------------------------------------------ read and write
@@ -187,8 +177,8 @@ class RtdeArm:
             tcp_quat=quat_of_rotation_vector(rx, ry, rz),
             tcp_force_n=(fx, fy, fz),
             grip=grip,
-            digital_in=self._pins.signals_in(receive.getActualDigitalInputBits() & _ALL_BITS),
-            digital_out=self._pins.signals_out(receive.getActualDigitalOutputBits() & _ALL_BITS),
+            digital_in=self._pins.signals_in(receive.getActualDigitalInputBits() & ALL_BITS),
+            digital_out=self._pins.signals_out(receive.getActualDigitalOutputBits() & ALL_BITS),
             mode=self._mode,
         )
 
@@ -201,13 +191,13 @@ class RtdeArm:
             StaleStateError: the link was cut, or sending took so long that the client may have reconnected.
             WireError: the hand does not answer.
         """
-        if self._control is None:
+        if self._command.control is None:
             raise NotEngagedError("arm: expected connect() and engage() before write(), and again after a stop")
         self._require_link()
         if self._runtime != Runtime.PLAYING:
             self._refuse("servoJ")
         servo, begun_ns = self._arm.servo, monotonic_ns()
-        taken = self._control.servoJ(
+        taken = self._command.control.servoJ(
             list(command.q_rad), 0.0, 0.0, 1.0 / RATE_HZ, servo.lookahead_s, servo.gain
         )  # fmt: skip
         spent_ns = monotonic_ns() - begun_ns
@@ -220,9 +210,7 @@ class RtdeArm:
         if not taken:
             self._refuse("servoJ")
         self._gripper.command(command.grip)
-        assert self._outputs is not None, "engage made it"
-        pins = self._pins.pins_out(command.digital_out, self._outputs.bits, now_ns=monotonic_ns())
-        untaken = self._outputs.put(pins)
+        untaken = self._command.put(command.digital_out)
         if untaken is not None:
             self._refuse(f"digital output {untaken}")
         self._ask_hand()
@@ -239,13 +227,13 @@ class RtdeArm:
         self.abandon()
         if self.links.is_lost_now:
             return False
-        if self._control is not None:
+        if self._command.control is not None:
             with suppress(RuntimeError):
-                self._control.servoStop(STOP_RAD_S2)
+                self._command.control.servoStop(STOP_RAD_S2)
         is_resting = self._wait_rest()
         if self.links.is_lost_now:
             return False
-        return self._drop_control() and is_resting
+        return self._command.drop(self.clock) and is_resting
 
     def abandon(self) -> None:
         """Stop the fingers: their wire is another than the arm's, and may be spoken on whatever became of that one."""
@@ -258,7 +246,7 @@ class RtdeArm:
             return
         self.stop()
         self._pace.pace_by(None)
-        dashboard, self._receive, self._dashboard = self._dashboard, None, None  # see _drop_control
+        dashboard, self._receive, self._dashboard = self._dashboard, None, None  # see RtdeCommand.drop
         with suppress(RuntimeError):
             if dashboard is not None:
                 dashboard.disconnect()
@@ -274,7 +262,7 @@ class RtdeArm:
     def _require_link(self) -> None:
         self.links.require()
 
-    def _reading(self) -> tuple[RTDEReceiveInterface, DashboardClient]:
+    def _reading(self) -> Readers:
         if self._receive is None or self._dashboard is None:
             raise StaleStateError("arm: expected connect() before read(); nothing was read")
         return self._receive, self._dashboard
@@ -286,7 +274,7 @@ class RtdeArm:
             self._last_timestamp, self._seen_ns = timestamp, now_ns
         elif now_ns - self._seen_ns > STALE_NS:
             age_ms = (now_ns - self._seen_ns) / 1e6
-            self.links.is_lost |= self._control is not None
+            self.links.is_lost |= self._command.control is not None
             raise StaleStateError(
                 f"arm: expected a state every 2 ms, the newest is {age_ms:.0f} ms old; is the link up?"
             )
@@ -329,61 +317,6 @@ class RtdeArm:
         if self.read().mode is not ArmMode.RUNNING:
             raise ArmRefusedError(f"hand: its activation was broken off: {why_refused(self.status())}")
 
-    def _take_command(self, receive: RTDEReceiveInterface) -> None:
-        self.links.look()
-        self.links.begin_guard(receive.getTimestamp)
-        self._control = self._take_control()
-        prove_watchdog(self._control, receive, self.clock)
-        self._require_link()
-        self.links.pause()
-        self._control = None
-        self.links.look()
-        self._control = self._take_control()
-        self._set_up(self._control, receive)
-        self._require_link()
-
-    def _take_control(self) -> RTDEControlInterface:
-        with bounded(TAKE_S if self.links.when_lost is not None else None):
-            control = RTDEControlInterface(self.address, RATE_HZ, RTDEControlInterface.FLAG_UPLOAD_SCRIPT)
-        self.links.look()
-        return control
-
-    def _set_up(self, control: RTDEControlInterface, receive: RTDEReceiveInterface) -> None:
-        """Set payload and tool centre point, open the outputs, arm the watchdog last."""
-        set_tool(control, receive, self.clock, self._arm.tool)
-        self._outputs = DigitalOutputs(self.address, bits=receive.getActualDigitalOutputBits() & _ALL_BITS)
-        self.links.look()
-        self._pins.forget()
-        arm_watchdog(control, receive, self.clock)  # from here on somebody must write
-
-    def _drop_control(self, *, is_in_traceback: bool = False) -> bool:
-        """End the program and forget its client: it must never get the chance to go on by itself.
-
-        A client disconnects when its last reference goes, and sleeps half a second each time it does. So it is told to
-        only where a traceback keeps it alive. Until it goes its link is watched: one that was lost is kept.
-
-        Returns:
-            Whether the program has ended.
-        """
-        is_ended = True
-        if self._control is not None:
-            receive, dashboard = self._reading()
-            is_ended = end_program(self._control, receive, dashboard, self.clock)
-        outputs, self._outputs = self._outputs, None
-        if outputs is not None:
-            with suppress(RuntimeError):
-                outputs.put(self._pins.rested(outputs.bits))
-        if self.links.is_lost_now:
-            return False
-        self.links.forget()
-        if outputs is not None:
-            outputs.close()
-        control, self._control = self._control, None
-        if control is not None and is_in_traceback:
-            with suppress(RuntimeError):
-                control.disconnect()
-        return is_ended
-
     def _refuse(self, what: str) -> None:
         require(False, what, receive=self._reading()[0], clock=self.clock)
 
@@ -405,6 +338,3 @@ class RtdeArm:
 def _vec6(values: Sequence[float]) -> Vec6:
     a, b, c, d, e, f = values
     return a, b, c, d, e, f
-
-
-_ALL_BITS = (1 << N_OUTPUTS) - 1

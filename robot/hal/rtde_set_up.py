@@ -86,18 +86,21 @@ def end_program(
         control.stopScript()
         if _await_end(receive, clock):
             return True
+    is_asked = False
     with suppress(RuntimeError):
         dashboard.stop()
+        is_asked = True  # its answer comes before the state that shows it
     with suppress(RuntimeError):
-        return _await_end(receive, clock)
+        return _await_end(receive, clock, may_be_paused=is_asked)
     return False
 
 
-def _await_end(receive: RTDEReceiveInterface, clock: Clock) -> bool:
-    """Wait until no program runs. What is paused does not end by itself."""
+def _await_end(receive: RTDEReceiveInterface, clock: Clock, *, may_be_paused: bool = False) -> bool:
+    """Wait until no program runs. What is paused does not end by itself: it is waited for only if that may be past."""
     deadline_ns = monotonic_ns() + round(END_S * 1e9)
     while (runtime := status_of(receive).runtime) != Runtime.STOPPED:
-        if monotonic_ns() > deadline_ns or runtime in (Runtime.PAUSING, Runtime.PAUSED):
+        is_paused = runtime in (Runtime.PAUSING, Runtime.PAUSED)
+        if monotonic_ns() > deadline_ns or (is_paused and not may_be_paused):
             return False
         clock.wait_tick()
     return True

@@ -4,7 +4,7 @@ import queue
 import threading
 from collections import deque
 from collections.abc import Callable
-from typing import Protocol
+from typing import Protocol, TypeAlias
 
 import msgspec
 
@@ -12,7 +12,7 @@ from sim_twin.controller.motion import SLICE_S
 from sim_twin.controller.script import Builtins, Interpreter, ScriptNameError, ScriptSyntaxError, parse_program
 from sim_twin.controller.script.builtins import Sockets
 
-__all__ = ["Compiled", "Compiler", "InlineCompiler", "Mistake", "ThreadCompiler", "compile_text"]
+__all__ = ["Compiled", "Compiler", "InlineCompiler", "Mistake", "Start", "ThreadCompiler", "compile_text"]
 
 N_WAITING = 1000
 """Texts that wait for the compiler; one more is turned away, or a flood would fill the memory."""
@@ -55,14 +55,28 @@ class Compiled:
         self.sockets.close()
 
 
-class Compiler(Protocol):
-    """Takes texts and hands out programs in the same order."""
+class Start:
+    """What comes of a text that is to start.
 
-    def submit(self, text: str) -> None:
+    Attributes:
+        has_begun: Its program has begun, or never will; None while that is not known.
+    """
+
+    def __init__(self) -> None:
+        self.has_begun: bool | None = None
+
+
+Done: TypeAlias = tuple[Compiled | Mistake, Start]
+
+
+class Compiler(Protocol):
+    """Takes texts and hands out programs in the same order, each with the start that it was sent with."""
+
+    def submit(self, text: str, start: Start) -> None:
         """Take a text; never wait."""
         ...
 
-    def take(self) -> Compiled | Mistake | None:
+    def take(self) -> Done | None:
         """Return the next that is done, or None."""
         ...
 
@@ -89,13 +103,13 @@ class InlineCompiler:
 
     def __init__(self, make_builtins: MakeBuiltins) -> None:
         self._make_builtins = make_builtins
-        self._done: deque[Compiled | Mistake] = deque()
+        self._done: deque[Done] = deque()
 
-    def submit(self, text: str) -> None:
+    def submit(self, text: str, start: Start) -> None:
         """Compile."""
-        self._done.append(compile_text(text, self._make_builtins))
+        self._done.append((compile_text(text, self._make_builtins), start))
 
-    def take(self) -> Compiled | Mistake | None:
+    def take(self) -> Done | None:
         """Return the next, or None."""
         return self._done.popleft() if self._done else None
 
@@ -108,21 +122,22 @@ class ThreadCompiler:
 
     def __init__(self, make_builtins: MakeBuiltins) -> None:
         self._make_builtins = make_builtins
-        self._texts: queue.SimpleQueue[str | None] = queue.SimpleQueue()
-        self._done: deque[Compiled | Mistake] = deque()
+        self._texts: queue.SimpleQueue[tuple[str, Start] | None] = queue.SimpleQueue()
+        self._done: deque[Done] = deque()
         self._thread: threading.Thread | None = None
 
-    def submit(self, text: str) -> None:
+    def submit(self, text: str, start: Start) -> None:
         """Queue a text."""
         if self._thread is None:
             self._thread = threading.Thread(target=self._work, name="compiler", daemon=True)
             self._thread.start()
         if self._texts.qsize() >= N_WAITING:
-            self._done.append(Mistake(message=f"expected at most {N_WAITING} programs to wait, one more was sent"))
+            turned_away = Mistake(message=f"expected at most {N_WAITING} programs to wait, one more was sent")
+            self._done.append((turned_away, start))
             return
-        self._texts.put(text)
+        self._texts.put((text, start))
 
-    def take(self) -> Compiled | Mistake | None:
+    def take(self) -> Done | None:
         """Return the next that is done, or None."""
         return self._done.popleft() if self._done else None
 
@@ -134,9 +149,10 @@ class ThreadCompiler:
             self._thread = None
 
     def _work(self) -> None:
-        while (text := self._texts.get()) is not None:
+        while (sent := self._texts.get()) is not None:
+            text, start = sent
             try:
                 done = compile_text(text, self._make_builtins)
             except Exception as error:  # noqa: BLE001 - the thread's outermost frame: nobody else would hear of it
                 done = Mistake(message=f"the compiler failed: {error!r}")
-            self._done.append(done)
+            self._done.append((done, start))

@@ -8,7 +8,7 @@ from sim_twin.controller.outputs import elbow, joint_mode
 from sim_twin.controller.program import UNNAMED, Programs
 from sim_twin.controller.script.builtins import Popup
 from sim_twin.controller.states import Event, RobotMode, RuntimeState, SafetyMode
-from sim_twin.controller.wire import DashboardStatus, Outcome
+from sim_twin.controller.wire import Awaited, DashboardStatus, Outcome
 from sim_twin.controller.wire.primary_state import (
     AdditionalInfo,
     CartesianInfo,
@@ -32,6 +32,7 @@ _STATES = {
     RuntimeState.PAUSING: "PAUSED",
     RuntimeState.PAUSED: "PAUSED",
 }
+_STARTED = {True: Outcome.DONE, False: Outcome.FAILED, None: None}
 _ESTOPS = (SafetyMode.SYSTEM_EMERGENCY_STOP, SafetyMode.ROBOT_EMERGENCY_STOP)
 _JOINTS_C: Vec6 = (JOINT_C, JOINT_C, JOINT_C, JOINT_C, JOINT_C, JOINT_C)
 _CHECKSUM = (0x1, 0x2, 0x3, 0x4, 0x5, 0x6)
@@ -105,16 +106,17 @@ class Panel:
         self.is_shut_down = True
         return Outcome.DONE
 
-    def play(self) -> Outcome:
-        """Start the loaded program, or resume a paused one."""
+    def play(self) -> Awaited:
+        """Start the loaded program, or resume a paused one. Whether it starts is known once it is compiled."""
         modes, programs = self._machine.modes, self._programs
         if modes.runtime is RuntimeState.PAUSED:
-            return self._happen(Event.PLAY)
+            resumed = self._happen(Event.PLAY)
+            return lambda: resumed
         is_ready = modes.robot is RobotMode.RUNNING and not modes.is_stopped_by_safety
         if programs.loaded is None or not is_ready or modes.runtime is not RuntimeState.STOPPED:
-            return Outcome.FAILED
-        programs.submit(programs.shelf[programs.loaded])
-        return Outcome.DONE
+            return lambda: Outcome.FAILED
+        start = programs.submit(programs.shelf[programs.loaded])
+        return lambda: _STARTED[start.has_begun]
 
     def stop(self) -> Outcome:
         """Stop whatever runs; UR answers alike where nothing does."""

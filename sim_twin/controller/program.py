@@ -1,6 +1,6 @@
 """The programs: one that moves the arm, secondary ones beside it, and those on the shelf. Stepped once a slice."""
 
-from sim_twin.controller.compiling import Compiled, Compiler, Mistake
+from sim_twin.controller.compiling import Compiled, Compiler, Mistake, Start
 from sim_twin.controller.machine import Machine
 from sim_twin.controller.script import Status
 from sim_twin.controller.states import Event, ProgramOrder, Reaction, RuntimeState
@@ -33,7 +33,7 @@ class Programs:
         self.shelf: dict[str, str] = {}
         self.loaded: str | None = None
         self.last_text = ""
-        self._next: Compiled | None = None
+        self._next: tuple[Compiled, Start] | None = None
         self._secondary: list[Compiled] = []
 
     @property
@@ -41,10 +41,12 @@ class Programs:
         """The line that the program is at; 0 where none runs."""
         return 0 if self.main is None else self.main.interpreter.line
 
-    def submit(self, text: str) -> None:
-        """Take a program's text: a `def` replaces the one that runs, a `sec` runs beside it."""
+    def submit(self, text: str) -> Start:
+        """Take a program's text: a `def` replaces the one that runs, a `sec` runs beside it. Tells what comes of it."""
         self.last_text = text
-        self._compiler.submit(text)
+        start = Start()
+        self._compiler.submit(text, start)
+        return start
 
     def handle(self, event: Event, *, joint: int | None = None) -> Reaction:
         """Let an event happen: modes, arm and program."""
@@ -62,9 +64,9 @@ class Programs:
         """Run one slice of everything that may run."""
         machine = self._machine
         while (done := self._compiler.take()) is not None:
-            self._take(done)
+            self._take(*done)
         if self._next is not None:
-            self._replace(self._next)
+            self._replace(*self._next)
         if self.main is not None and machine.modes.may_move:
             status = self.main.interpreter.step()
             if status is not Status.RUNNING:
@@ -77,12 +79,13 @@ class Programs:
     def close(self) -> None:
         """End all programs and their connections."""
         self._compiler.close()
-        for program in (self.main, self._next, *self._secondary):
+        waiting = None if self._next is None else self._next[0]
+        for program in (self.main, waiting, *self._secondary):
             if program is not None:
                 program.close()
         self.main, self._next, self._secondary = None, None, []
 
-    def _take(self, done: Compiled | Mistake) -> None:
+    def _take(self, done: Compiled | Mistake, start: Start) -> None:
         if isinstance(done, Mistake):
             self._machine.journal.exception(
                 program=UNNAMED,
@@ -92,12 +95,16 @@ class Programs:
                 message=done.message,
                 as_reported=done.as_reported,
             )
+            start.has_begun = False
         elif done.is_secondary:
             self._secondary.append(done)
+            start.has_begun = True
         else:
-            self._next = done
+            if self._next is not None:
+                self._next[1].has_begun = False
+            self._next = done, start
 
-    def _replace(self, program: Compiled) -> None:
+    def _replace(self, program: Compiled, start: Start) -> None:
         """Stop what runs, and start once it has stopped."""
         runtime = self._machine.modes.runtime
         if runtime not in (RuntimeState.STOPPING, RuntimeState.STOPPED):
@@ -106,6 +113,7 @@ class Programs:
             return
         self._next = None
         refusal = self.handle(Event.PLAY).refusal
+        start.has_begun = refusal is None
         if refusal is not None:
             program.close()
             self._machine.journal.note(f"program {program.name or UNNAMED} was not started: {refusal}")
@@ -119,7 +127,11 @@ class Programs:
         fault = program.interpreter.error
         if fault is not None:
             self._machine.journal.exception(
-                program=program.name or UNNAMED, thread=fault.thread, line=fault.line, column=0, message=fault.message
+                program=program.name or UNNAMED,
+                thread=fault.thread,
+                line=fault.line,
+                column=fault.column,
+                message=fault.message,
             )
         core = self._machine.drive.core
         core.tail = None
@@ -146,7 +158,7 @@ class Programs:
                 program=program.name,
                 thread=fault.thread,
                 line=fault.line,
-                column=0,
+                column=fault.column,
                 message=fault.message,
                 as_reported=f"{SECONDARY}{fault.message}",
             )

@@ -124,6 +124,22 @@ def test_a_dashboard_that_hung_up_is_said_by_name(controller, arm):
         arm.engage()
 
 
+def test_a_program_that_a_protective_stop_has_paused_is_seen_to_end():
+    """The dashboard answers before the state that shows it has come: a stop that looks at once sees it paused."""
+    from robot.hal.rtde import RtdeArm
+
+    with ControllerProcess(Setup(host=own_address())) as controller:
+        arm = RtdeArm(arm=CONFIG, address=controller.host)
+        arm.connect()
+        with undisturbed():
+            arm.engage()
+        controller.fault("protective_stop")
+        wait(arm, 100)
+        is_confirmed = arm.stop()
+        arm.close()
+        assert is_confirmed
+
+
 def test_a_program_that_only_a_person_can_end_is_no_confirmed_stop(controller, arm):
     with undisturbed():
         arm.engage()

@@ -192,7 +192,7 @@ class WireWorld:
         plant = self.__dict__.pop("_plant", None)
         if plant is not None:
             plant.arm.close()
-            plant.arm._control = None
+            plant.arm._command.control = None
 
     def close(self):
         self._open.close()

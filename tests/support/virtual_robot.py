@@ -5,9 +5,10 @@ import numpy as np
 from sim_twin.controller.robot import VirtualRobot, make_world
 from sim_twin.controller.states import RuntimeState
 
-__all__ = ["RegisterClient", "make_robot", "run"]
+__all__ = ["FOREVER", "RegisterClient", "ended", "lines", "make_robot", "run", "started", "state_of"]
 
 READY, DONE, FREE = 1, 2, 0
+FOREVER = "def waits():\n  while True:\n    sync()\n  end\nend\n"
 
 
 def make_robot(**settings):
@@ -22,6 +23,29 @@ def run(robot, n=1, until=None):
         robot.step()
     assert until is None or until(), list(robot.machine.journal.lines)[-5:]
     return n
+
+
+def started(text, **settings):
+    """Return a robot on which the program plays."""
+    robot = make_robot(**settings)
+    robot.submit_script(text)
+    run(robot, 5, lambda: state_of(robot) is RuntimeState.PLAYING)
+    return robot
+
+
+def lines(robot):
+    """Return the log's lines."""
+    return [text for _, text in robot.machine.journal.lines]
+
+
+def state_of(robot):
+    """Return what its program does."""
+    return robot.machine.modes.runtime
+
+
+def ended(robot, n=2000):
+    """Step until no program runs; return how many slices that took."""
+    return run(robot, n, lambda: state_of(robot) is RuntimeState.STOPPED)
 
 
 class RegisterClient:

@@ -11,6 +11,7 @@ from sim_twin.controller.builtins.registers import register_builtins
 from sim_twin.controller.builtins.speeds import speed_builtins
 from sim_twin.controller.builtins.state import state_builtins
 from sim_twin.controller.builtins.terminals import terminal_builtins
+from sim_twin.controller.builtins.versions import known_to
 from sim_twin.controller.machine import Machine
 from sim_twin.controller.motion import SLICE_S
 from sim_twin.controller.script import Builtins
@@ -37,6 +38,7 @@ def robot_builtins(machine: Machine) -> Builtins:
 
 
 def program_builtins(machine: Machine, sockets: Sockets) -> Builtins:
-    """Return everything that one program can call; its sockets are its own."""
+    """Return everything that one program can call at the announced version; its sockets are its own."""
     timing, messages = time_builtins(slice_s=SLICE_S), message_builtins(machine.journal)
-    return {**PURE, **timing, **messages, **sockets.builtins, **robot_builtins(machine)}
+    everything = {**PURE, **timing, **messages, **sockets.builtins, **robot_builtins(machine)}
+    return known_to(machine.version, everything)

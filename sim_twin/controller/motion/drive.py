@@ -1,6 +1,5 @@
 """The drive: set-points into the twin's servos, 2 ms of physics, measurements out; brakes where there is no power."""
 
-import math
 from collections import deque
 from collections.abc import Sequence
 
@@ -39,6 +38,8 @@ HELD_RAD_S = 0.005
 BRAKE_SOLIMP = (0.9999, 0.9999)
 """A brake that hardly creeps; MuJoCo's own friction gives way in proportion to the load."""
 N_HISTORY = 1000
+MOST_TOLD_KG, MOST_TOLD_M = 100.0, 10.0
+"""Numbers beyond these are a slip, and great ones would overflow to a force that no limit compares with."""
 NOWHERE_M = np.zeros(3)
 
 
@@ -181,12 +182,14 @@ class TwinDrive:
         """Tell the controller what hangs on the flange; what is not so biases the force.
 
         Raises:
-            ValueError: a mass below zero, or a number that is not finite.
+            ValueError: a mass below zero, or mass or place beyond anything that an arm carries.
         """
-        if not 0.0 <= mass_kg < math.inf:
-            raise ValueError(f"payload: expected 0 kg or more, got {mass_kg}; give the mass that hangs on the flange")
-        if not np.isfinite(cog_m).all():
-            raise ValueError(f"payload: expected a finite centre of gravity (m), got {[*cog_m]}")
+        if not 0.0 <= mass_kg <= MOST_TOLD_KG:
+            raise ValueError(
+                f"payload: expected 0 to {MOST_TOLD_KG:g} kg, got {mass_kg}; give the mass that hangs on the flange"
+            )
+        if not (np.abs(cog_m) <= MOST_TOLD_M).all():
+            raise ValueError(f"payload: expected a centre of gravity within {MOST_TOLD_M:g} m, got {[*cog_m]}")
         self._payload = (mass_kg, np.array(cog_m, dtype=np.float64))
 
     def hang(self, extra_kg: float) -> None:

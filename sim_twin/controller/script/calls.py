@@ -7,7 +7,7 @@ from types import GeneratorType
 from sim_twin.controller.script.code import Builtin, Code, Fast, Frame, Slow, applied
 from sim_twin.controller.script.context import Context, Routine, Scope, takes_time
 from sim_twin.controller.script.errors import ScriptRuntimeError
-from sim_twin.controller.script.syntax import Call, Definition, Expression, Run
+from sim_twin.controller.script.syntax import Call, Definition, Expression, Place, Run
 from sim_twin.controller.script.threads import Steps, Wait
 from sim_twin.controller.script.values import Value, copied, described
 
@@ -33,12 +33,12 @@ def compile_call(node: Call, scope: Scope, compiled: Callable[[Expression], Code
         if definition.is_thread:
             return _failing(f"'{node.name}' is a thread, start it with run {node.name}()")
         routine = scope.context.routine(definition, around)
-        return _call_of_routine(node, scope.context, routine, _bound(definition, positional, keywords))
+        return _call_of_routine(scope.context, routine, _bound(definition, positional, keywords))
     builtin = scope.context.builtins[node.name]
     mistake = _mistake(node.name, _parameters_of(scope.context.signature(node.name)), len(positional), keywords)
     if mistake:
         return _failing(mistake)
-    return _call_of_builtin(node, scope.context, builtin, positional, keywords)
+    return _call_of_builtin(node.name, builtin, positional, keywords)
 
 
 def compile_run(node: Run, scope: Scope) -> Code[Value]:
@@ -104,9 +104,7 @@ def _parameters_of(signature: inspect.Signature | None) -> dict[str, bool] | Non
     return {name: p.default is p.empty for name, p in signature.parameters.items()}
 
 
-def _call_of_routine(
-    node: Call, context: Context, routine: Routine, bound: dict[str, Code[Value]] | str
-) -> Code[Value]:
+def _call_of_routine(context: Context, routine: Routine, bound: dict[str, Code[Value]] | str) -> Code[Value]:
     if isinstance(bound, str):
         return _failing(bound)
     arguments = [(routine.scope.places[name], code) for name, code in bound.items()]
@@ -116,7 +114,7 @@ def _call_of_routine(
         if parameter.name not in bound
     ]
     if routine.definition.name in context.slow or any(isinstance(code, Slow) for _, code in arguments):
-        return _slow_call(node, context, routine, arguments, defaults)
+        return _slow_call(context, routine, arguments, defaults)
     fast = [(place, code.run) for place, code in arguments if isinstance(code, Fast)]
     meter = context.meter
 
@@ -127,19 +125,18 @@ def _call_of_routine(
         for place, name in defaults:
             default = routine.defaults[name]
             inner[place] = default.run(inner) if isinstance(default, Fast) else None
-        _open(context, routine)
+        place = _open(context, routine)
         body = routine.body
         if isinstance(body, Fast):
             body.run(inner)
         meter.depth -= 1
-        meter.line = node.line
+        meter.place = place
         return inner[0]  # pyright: ignore[reportReturnType] - the first place is never unset
 
     return Fast(call)
 
 
 def _slow_call(
-    node: Call,
     context: Context,
     routine: Routine,
     arguments: list[tuple[int, Code[Value]]],
@@ -154,25 +151,27 @@ def _slow_call(
         for place, name in defaults:
             code = routine.defaults[name]
             inner[place] = (yield from code.run(inner)) if isinstance(code, Slow) else code.run(inner)
-        _open(context, routine)
+        place = _open(context, routine)
         body = routine.body
         if isinstance(body, Slow):
             yield from body.run(inner)
         elif body is not None:
             body.run(inner)
         meter.depth -= 1
-        meter.line = node.line
+        meter.place = place
         return inner[0]  # pyright: ignore[reportReturnType] - as above
 
     return Slow(call)
 
 
-def _open(context: Context, routine: Routine) -> None:
+def _open(context: Context, routine: Routine) -> Place:
+    """Begin a call; return the statement that it stands in, which is the one again once it is over."""
     meter = context.meter
     meter.depth += 1
     if meter.depth > _MAX_DEPTH:
         name = routine.definition.name
         raise ScriptRuntimeError(f"{name}() calls itself too deep, at most {_MAX_DEPTH} calls may be open")
+    return meter.place
 
 
 def _reason(error: Exception, values: Sequence[Value]) -> str:
@@ -183,18 +182,15 @@ def _reason(error: Exception, values: Sequence[Value]) -> str:
 
 
 def _call_of_builtin(
-    node: Call,
-    context: Context,
+    called: str,
     builtin: Builtin,
     positional: list[Code[Value]],
     keywords: Mapping[str, Code[Value]],
 ) -> Code[Value]:
     n_positional, names = len(positional), list(keywords)
-    meter = context.meter
 
     def failed(error: Exception, values: Sequence[Value]) -> ScriptRuntimeError:
-        meter.line = node.line
-        return ScriptRuntimeError(f"{node.name}(): {_reason(error, values)}")
+        return ScriptRuntimeError(f"{called}(): {_reason(error, values)}")
 
     def named(*values: Value) -> "Value | Generator[Wait | None, None, Value]":
         given = zip(names, values[n_positional:], strict=True)
@@ -218,7 +214,7 @@ def _call_of_builtin(
         except _BAD_ARGUMENTS as error:
             raise failed(error, values) from error
         if type(result) is GeneratorType:
-            raise TypeError(f"builtin {node.name} returned a generator, so declare it as a generator function")
+            raise TypeError(f"builtin {called} returned a generator, so declare it as a generator function")
         return result  # pyright: ignore[reportReturnType] - no generator, as tested
 
     return applied(value_of, operands)

@@ -29,7 +29,7 @@ class Context:
 
     Attributes:
         builtins: What the host offers.
-        meter: Line and budget of the running thread.
+        meter: Place and budget of the running thread.
         scheduler: The threads.
         globals: Values of the global variables.
         global_places: Where in it each is.

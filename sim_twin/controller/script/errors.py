@@ -35,14 +35,16 @@ class ScriptNameError(ScriptError):
     """
 
     def __init__(self, name: str, *, line: int, column: int) -> None:
-        super().__init__(f"line {line}, column {column}: '{name}' is not defined, neither in the program nor built in")
+        super().__init__(
+            f"line {line}, column {column}: '{name}' is not defined in the program, nor built in at this version"
+        )
         self.line = line
         self.column = column
         self.as_reported = f"compile_error_name_not_found:{name}:"
 
 
 class ScriptRuntimeError(ScriptError):
-    """The running script did what a robot stops for; the interpreter knows the line."""
+    """The running script did what a robot stops for; the interpreter knows the place."""
 
 
 class ScriptFault(msgspec.Struct, frozen=True, kw_only=True):
@@ -50,10 +52,12 @@ class ScriptFault(msgspec.Struct, frozen=True, kw_only=True):
 
     Attributes:
         message: What was expected and what came.
-        line: The line that was being executed.
+        line: Where the statement that was being executed begins.
+        column: Where on that line, counted from one.
         thread: The name of the thread that executed it; the program's own name for its main thread.
     """
 
     message: str
     line: int
+    column: int
     thread: str

@@ -18,6 +18,7 @@ from sim_twin.controller.script.syntax import (
     MethodCall,
     Name,
     Not,
+    Place,
     PoseLiteral,
     Run,
     StructLiteral,
@@ -101,9 +102,9 @@ class ExpressionParser:
         """Return where on its line a token begins, counted from one."""
         return token.offset - self._text.rfind("\n", 0, token.offset)
 
-    def place(self, token: Token) -> tuple[int, int]:
-        """Return a token's line and column."""
-        return token.line, self.column(token)
+    def place(self, token: Token) -> Place:
+        """Return where a token begins."""
+        return Place(token.line, self.column(token))
 
     def expression(self) -> Expression:
         """Parse an expression."""

@@ -8,7 +8,7 @@ from sim_twin.controller.script.context import Context, Scope
 from sim_twin.controller.script.errors import ScriptFault, ScriptRuntimeError
 from sim_twin.controller.script.names import check_names
 from sim_twin.controller.script.statements import compile_body, compile_routine
-from sim_twin.controller.script.syntax import Definition, Program
+from sim_twin.controller.script.syntax import Definition, Place, Program
 from sim_twin.controller.script.threads import Meter, ProgramHalted, Scheduler, Steps
 from sim_twin.controller.script.values import Value, copied
 
@@ -68,7 +68,7 @@ class Interpreter:
             meter=self._meter,
             variables={name: copied(value) for name, value in (variables or {}).items()},
         )
-        definition = Definition(1, program.name, False, (), program.body)
+        definition = Definition(Place(1, 1), program.name, False, (), program.body)
         scope = Scope(context, definition, None, is_main=True)
         body = compile_body(scope)
         while context.to_compile:
@@ -78,7 +78,7 @@ class Interpreter:
     @property
     def line(self) -> int:
         """The line that the main thread is at."""
-        return self._main.line
+        return self._main.place.line
 
     def step(self) -> Status:
         """Run one slice of every thread and return the status."""
@@ -104,7 +104,8 @@ class Interpreter:
 
     def _fail(self, message: str) -> None:
         thread = self._scheduler.running or self._main
-        self.error = ScriptFault(message=message, line=self._meter.line, thread=thread.name)
+        line, column = self._meter.place
+        self.error = ScriptFault(message=message, line=line, column=column, thread=thread.name)
         self._end(Status.FAILED)
 
     def _end(self, status: Status) -> None:

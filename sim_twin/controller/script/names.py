@@ -11,7 +11,7 @@ import msgspec
 
 from sim_twin.controller.script.errors import ScriptNameError
 from sim_twin.controller.script.scopes import Functions, assigned_names, definitions_in, global_names, statements_in
-from sim_twin.controller.script.syntax import Call, Definition, If, Name, Program, Run, Statement, While
+from sim_twin.controller.script.syntax import Call, Definition, If, Name, Place, Program, Run, Statement, While
 
 __all__ = ["check_names"]
 
@@ -52,7 +52,7 @@ def check_names(program: Program, *, builtins: Collection[str], variables: Colle
         ScriptNameError: nothing has this name; the first such in the text.
     """
     known = _Known(None, builtins, global_names(program) | set(variables))
-    main = Definition(1, program.name, False, (), program.body)
+    main = Definition(Place(1, 1), program.name, False, (), program.body)
     first = min(_unknown(main, known), key=lambda use: (use.line, use.column), default=None)
     if first is not None:
         raise ScriptNameError(first.name, line=first.line, column=first.column)

@@ -19,6 +19,7 @@ from sim_twin.controller.script.syntax import (
     MethodCall,
     Name,
     Parameter,
+    Place,
     Program,
     Return,
     Run,
@@ -82,31 +83,31 @@ class _Parser(ExpressionParser):
         return self._assignment_or_call()
 
     def _assignment_or_call(self) -> Statement:
-        line = self.token.line
+        place = self.place(self.token)
         if self.kind != "name":
             self.fail("a statement")
         target = self.postfix()
         if self.kind == "=":
-            return self._assigned(line, "", target)
+            return self._assigned(place, "", target)
         if not isinstance(target, Call | MethodCall):
             self.fail("'=' or a call's '('")
-        return Evaluate(line, target)
+        return Evaluate(place, target)
 
     def _scoped(self) -> Statement:
         token = self.advance()
         target = Name(self.name("a variable's name"), *self.place(self._tokens[self._at - 1]))
         if self.kind != "=":
             self.fail("'='")
-        return self._assigned(token.line, token.kind, target)
+        return self._assigned(self.place(token), token.kind, target)
 
-    def _assigned(self, line: int, scope: str, target: Expression) -> Statement:
+    def _assigned(self, place: Place, scope: str, target: Expression) -> Statement:
         root = target
         while isinstance(root, Index | Member):
             root = root.container if isinstance(root, Index) else root.owner
         if not isinstance(root, Name) or not isinstance(target, Name | Index | Member):
             self.fail("a variable, an element or a member before '='", got="something else")
         self.expect("=")
-        return Assign(line, scope, target, self.expression())
+        return Assign(place, scope, target, self.expression())
 
     def _definition(self) -> Definition:
         token = self.advance()
@@ -127,7 +128,7 @@ class _Parser(ExpressionParser):
         self._functions -= 1
         self._loops = loops
         self.expect("end")
-        return Definition(token.line, name, token.kind == "thread", tuple(parameters), body)
+        return Definition(self.place(token), name, token.kind == "thread", tuple(parameters), body)
 
     def _parameter(self, before: list[Parameter]) -> Parameter:
         name = self.name("a parameter's name or ')'")
@@ -146,11 +147,11 @@ class _Parser(ExpressionParser):
         return self._definition()
 
     def _if(self) -> Statement:
-        line = self.token.line
-        branches: list[tuple[int, Expression, tuple[Statement, ...]]] = []
+        place = self.place(self.token)
+        branches: list[tuple[Place, Expression, tuple[Statement, ...]]] = []
         otherwise: tuple[Statement, ...] = ()
         while not branches or self.kind == "elif":
-            at = self.advance().line
+            at = self.place(self.advance())
             condition = self.expression()
             self.expect(":")
             branches.append((at, condition, self._block()))
@@ -159,53 +160,53 @@ class _Parser(ExpressionParser):
             self.expect(":")
             otherwise = self._block()
         self.expect("end")
-        return If(line, tuple(branches), otherwise)
+        return If(place, tuple(branches), otherwise)
 
     def _while(self) -> Statement:
-        line = self.advance().line
+        place = self.place(self.advance())
         condition = self.expression()
         self.expect(":")
         self._loops += 1
         body = self._block()
         self._loops -= 1
         self.expect("end")
-        return While(line, condition, body)
+        return While(place, condition, body)
 
     def _jump(self) -> Statement:
         if not self._loops:
             self.fail(f"a loop around '{self.kind}'", got="none")
         token = self.advance()
-        return Jump(token.line, token.kind)
+        return Jump(self.place(token), token.kind)
 
     def _return(self) -> Statement:
         if not self._functions:
             self.fail("a function around 'return'", got="none")
-        line = self.advance().line
+        place = self.place(self.advance())
         if self.token.is_first or self.kind in _BLOCK_ENDS or self.kind == ";":
-            return Return(line, None)
-        return Return(line, self.expression())
+            return Return(place, None)
+        return Return(place, self.expression())
 
     def _thread_action(self) -> Statement:
         token = self.advance()
-        return ThreadAction(token.line, token.kind, self.expression())
+        return ThreadAction(self.place(token), token.kind, self.expression())
 
     def _critical(self) -> Statement:
         token = self.advance()
-        return Critical(token.line, token.kind == "enter_critical")
+        return Critical(self.place(token), token.kind == "enter_critical")
 
     def _halt(self) -> Statement:
-        line = self.advance().line
+        place = self.place(self.advance())
         if self.kind == "(" and not self.token.is_first:
             self.advance()
             self.expect(")")
-        return Halt(line)
+        return Halt(place)
 
     def _run(self) -> Statement:
-        line = self.token.line
+        place = self.place(self.token)
         expression = self.expression()
         if not isinstance(expression, Run):
             self.fail("the end of the line after 'run'", got="an operator")
-        return Evaluate(line, expression)
+        return Evaluate(place, expression)
 
 
 _STATEMENTS: dict[str, Callable[[_Parser], Statement]] = {

@@ -16,6 +16,7 @@ from sim_twin.controller.script.syntax import (
     Halt,
     If,
     Jump,
+    Place,
     Return,
     Statement,
     ThreadAction,
@@ -44,8 +45,8 @@ def compile_routine(routine: Routine) -> None:
 
 
 def _block(body: tuple[Statement, ...], scope: Scope) -> Code[Ending]:
-    steps = [(node.line, _COMPILERS[type(node)](node, scope)) for node in body if not isinstance(node, Definition)]
-    fast = [(line, step.run) for line, step in steps if isinstance(step, Fast)]
+    steps = [(node.place, _COMPILERS[type(node)](node, scope)) for node in body if not isinstance(node, Definition)]
+    fast = [(place, step.run) for place, step in steps if isinstance(step, Fast)]
     if len(fast) < len(steps):
         return _slow_block(steps, scope)
     meter, cost = scope.context.meter, len(steps)
@@ -54,8 +55,8 @@ def _block(body: tuple[Statement, ...], scope: Scope) -> Code[Ending]:
         meter.left -= cost
         if meter.left < 0:
             _exhausted(scope)
-        for line, step in fast:
-            meter.line = line
+        for place, step in fast:
+            meter.place = place
             signal = step(frame)
             if signal is not None:
                 return signal
@@ -64,17 +65,17 @@ def _block(body: tuple[Statement, ...], scope: Scope) -> Code[Ending]:
     return Fast(run)
 
 
-def _slow_block(steps: list[tuple[int, Code[Ending]]], scope: Scope) -> Code[Ending]:
+def _slow_block(steps: list[tuple[Place, Code[Ending]]], scope: Scope) -> Code[Ending]:
     meter, cost = scope.context.meter, len(steps)
     # Whether a step may take time is asked here once, not at every turn.
-    kinds: list[tuple[int, Callable[[Frame], Any], bool]] = [(n, s.run, isinstance(s, Slow)) for n, s in steps]
+    kinds: list[tuple[Place, Callable[[Frame], Any], bool]] = [(n, s.run, isinstance(s, Slow)) for n, s in steps]
 
     def run(frame: Frame) -> Steps[Ending]:
         meter.left -= cost
         if meter.left < 0:
             _exhausted(scope)
-        for line, step, is_slow in kinds:
-            meter.line = line
+        for place, step, is_slow in kinds:
+            meter.place = place
             signal = (yield from step(frame)) if is_slow else step(frame)
             if signal is not None:
                 return signal
@@ -115,11 +116,11 @@ def _evaluate(node: Evaluate, scope: Scope) -> Code[Ending]:
 
 
 def _if(node: If, scope: Scope) -> Code[Ending]:
-    branches = [(line, compile_expression(test, scope), _block(body, scope)) for line, test, body in node.branches]
+    branches = [(at, compile_expression(test, scope), _block(body, scope)) for at, test, body in node.branches]
     otherwise = _block(node.otherwise, scope)
     fast = [
-        (line, test.run, block.run)
-        for line, test, block in branches
+        (place, test.run, block.run)
+        for place, test, block in branches
         if isinstance(test, Fast) and isinstance(block, Fast)
     ]
     meter = scope.context.meter
@@ -127,8 +128,8 @@ def _if(node: If, scope: Scope) -> Code[Ending]:
         last = otherwise.run
 
         def run(frame: Frame) -> Ending:
-            for line, test, block in fast:
-                meter.line = line
+            for place, test, block in fast:
+                meter.place = place
                 value = test(frame)
                 if value if value is True or value is False else truth(value):
                     return block(frame)
@@ -138,8 +139,8 @@ def _if(node: If, scope: Scope) -> Code[Ending]:
 
     def run_slowly(frame: Frame) -> Steps[Ending]:
         chosen: Code[Ending] = otherwise
-        for line, test, block in branches:
-            meter.line = line
+        for place, test, block in branches:
+            meter.place = place
             value = (yield from test.run(frame)) if isinstance(test, Slow) else test.run(frame)
             if value if value is True or value is False else truth(value):
                 chosen = block
@@ -151,10 +152,10 @@ def _if(node: If, scope: Scope) -> Code[Ending]:
 
 def _while(node: While, scope: Scope) -> Code[Ending]:
     test, block = compile_expression(node.condition, scope), _block(node.body, scope)
-    meter, line = scope.context.meter, node.line
+    meter, place = scope.context.meter, node.place
 
     def begin_round() -> None:
-        meter.line = line
+        meter.place = place
         meter.left -= 1
         if meter.left < 0:
             _exhausted(scope)

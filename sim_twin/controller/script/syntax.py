@@ -1,6 +1,6 @@
-"""The tree of a program. Nodes are plain and never change; a statement knows its line."""
+"""The tree of a program. Nodes are plain and never change; a statement knows its place."""
 
-from typing import TypeAlias
+from typing import NamedTuple, TypeAlias
 
 import msgspec
 
@@ -24,6 +24,7 @@ __all__ = [
     "Name",
     "Not",
     "Parameter",
+    "Place",
     "PoseLiteral",
     "Program",
     "Return",
@@ -34,6 +35,13 @@ __all__ = [
     "Unary",
     "While",
 ]
+
+
+class Place(NamedTuple):
+    """A place in the text, counted from one; 0 where it is none."""
+
+    line: int
+    column: int
 
 
 class Constant(msgspec.Struct, frozen=True):
@@ -157,7 +165,7 @@ Expression: TypeAlias = (
 class Assign(msgspec.Struct, frozen=True):
     """Target = value; scope is "global", "local" or "" where the program leaves it open."""
 
-    line: int
+    place: Place
     scope: str
     target: Name | Index | Member
     value: Expression
@@ -166,22 +174,22 @@ class Assign(msgspec.Struct, frozen=True):
 class Evaluate(msgspec.Struct, frozen=True):
     """An expression for what it does."""
 
-    line: int
+    place: Place
     expression: Expression
 
 
 class If(msgspec.Struct, frozen=True):
     """If and elif branches in order, then the else block."""
 
-    line: int
-    branches: "tuple[tuple[int, Expression, tuple[Statement, ...]], ...]"
+    place: Place
+    branches: "tuple[tuple[Place, Expression, tuple[Statement, ...]], ...]"
     otherwise: "tuple[Statement, ...]"
 
 
 class While(msgspec.Struct, frozen=True):
     """A loop."""
 
-    line: int
+    place: Place
     condition: Expression
     body: "tuple[Statement, ...]"
 
@@ -189,21 +197,21 @@ class While(msgspec.Struct, frozen=True):
 class Jump(msgspec.Struct, frozen=True):
     """Break or continue."""
 
-    line: int
+    place: Place
     word: str
 
 
 class Return(msgspec.Struct, frozen=True):
     """Return, with or without a value."""
 
-    line: int
+    place: Place
     value: Expression | None
 
 
 class ThreadAction(msgspec.Struct, frozen=True):
     """Kill or join, and the handle."""
 
-    line: int
+    place: Place
     word: str
     handle: Expression
 
@@ -211,14 +219,14 @@ class ThreadAction(msgspec.Struct, frozen=True):
 class Critical(msgspec.Struct, frozen=True):
     """enter_critical or exit_critical."""
 
-    line: int
+    place: Place
     is_enter: bool
 
 
 class Halt(msgspec.Struct, frozen=True):
     """Ends the program."""
 
-    line: int
+    place: Place
 
 
 class Parameter(msgspec.Struct, frozen=True):
@@ -231,7 +239,7 @@ class Parameter(msgspec.Struct, frozen=True):
 class Definition(msgspec.Struct, frozen=True):
     """A function, a thread, or the program itself."""
 
-    line: int
+    place: Place
     name: str
     is_thread: bool
     parameters: tuple[Parameter, ...]

@@ -13,6 +13,7 @@ from collections.abc import Generator
 from typing import TypeAlias, TypeVar
 
 from sim_twin.controller.script.errors import ScriptRuntimeError
+from sim_twin.controller.script.syntax import Place
 from sim_twin.controller.script.values import Value
 
 __all__ = ["Meter", "ProgramHalted", "Scheduler", "Steps", "Thread", "Wait"]
@@ -21,6 +22,7 @@ T = TypeVar("T")
 
 
 _MAX_THREADS = 100
+NOWHERE = Place(0, 0)
 
 
 class Wait(enum.Enum):
@@ -48,15 +50,15 @@ class Meter:
     """What the running thread has used: read and written by compiled code, so plain attributes.
 
     Attributes:
-        line: The line being executed.
+        place: Where the statement that is being executed begins.
         left: How many operations the thread may still execute in this slice.
         depth: How many calls are open.
     """
 
-    __slots__ = ("depth", "left", "line")
+    __slots__ = ("depth", "left", "place")
 
     def __init__(self) -> None:
-        self.line = 0
+        self.place = NOWHERE
         self.left = 0
         self.depth = 0
 
@@ -64,13 +66,13 @@ class Meter:
 class Thread:
     """One thread: its work as a generator, and its side of the meter while another runs."""
 
-    __slots__ = ("depth", "is_alive", "is_waiting", "left", "line", "name", "work")
+    __slots__ = ("depth", "is_alive", "is_waiting", "left", "name", "place", "work")
 
     def __init__(self, name: str, work: Steps[object], budget: int) -> None:
         self.name = name
         self.work = work
         self.left = budget
-        self.line = self.depth = 0
+        self.place, self.depth = NOWHERE, 0
         self.is_alive = True
         self.is_waiting = False
 
@@ -185,7 +187,7 @@ class Scheduler:
 
     def _advance(self, thread: Thread) -> Wait | None:
         meter = self._meter
-        meter.line, meter.left, meter.depth = thread.line, thread.left, thread.depth
+        meter.place, meter.left, meter.depth = thread.place, thread.left, thread.depth
         self.running = thread
         try:
             wait = thread.work.send(None)
@@ -193,7 +195,7 @@ class Scheduler:
             self._end(thread)
             return None
         finally:
-            thread.line, thread.left, thread.depth = meter.line, meter.left, meter.depth
+            thread.place, thread.left, thread.depth = meter.place, meter.left, meter.depth
         if isinstance(wait, Wait) and wait is not Wait.OUTSIDE:
             return wait
         if not self._may_take_time:

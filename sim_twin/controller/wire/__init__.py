@@ -1,6 +1,6 @@
 """The controller's TCP ports: RTDE, dashboard, state and script ports, and the gripper's."""
 
-from sim_twin.controller.wire.dashboard_target import DashboardStatus, DashboardTarget, Outcome
+from sim_twin.controller.wire.dashboard_target import Awaited, DashboardStatus, DashboardTarget, Outcome
 from sim_twin.controller.wire.gripper_port import GripperMeasurement, GripperRequest, GripperTarget
 from sim_twin.controller.wire.reactor import Port
 from sim_twin.controller.wire.rtde_fields import FieldType, Value, input_fields, output_fields
@@ -10,6 +10,7 @@ from sim_twin.controller.wire.version import ControllerVersion
 from sim_twin.controller.wire.wires import Wires
 
 __all__ = [
+    "Awaited",
     "ControllerVersion",
     "DashboardStatus",
     "DashboardTarget",

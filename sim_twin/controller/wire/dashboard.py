@@ -6,7 +6,9 @@ changes nothing (Universal_Robots_Client_Library, pull request 397). In local co
 and a connection that was made in local control stays refused: UR asks for a reconnect, so does this.
 """
 
+from collections import deque
 from collections.abc import Callable
+from typing import TypeAlias
 
 import msgspec
 
@@ -27,29 +29,35 @@ TOO_EARLY = (
 )
 _N_LINE_BYTES = 4096
 _N_WORDS = 4
+_N_LINES = 100
+"""Lines that wait behind a reply which is not known yet; a client that sends more is cut off."""
 _ALWAYS = ((5, 0), (3, 0))
+_Later: TypeAlias = Callable[[], str | None]
+"""Returns a reply once there is one."""
 
 
 class _Command(msgspec.Struct, frozen=True):
     """One command.
 
     Attributes:
-        answer: Returns the reply to the text after the command's words.
+        answer: Returns the reply to the text after the command's words, or what returns it later.
         is_acting: Whether it needs remote control.
         since: First version of an e-Series and of a CB3 that knows it.
     """
 
-    answer: Callable[[str], str]
+    answer: Callable[[str], str | _Later]
     is_acting: bool = False
     since: tuple[tuple[int, ...] | None, tuple[int, ...] | None] = _ALWAYS
 
 
 class _Client:
-    """One client: its unfinished line, and whether it connected in remote control."""
+    """One client: its unfinished line, what it waits for, and whether it connected in remote control."""
 
     def __init__(self, is_remote: bool) -> None:
         self.lines = LineReader(_N_LINE_BYTES)
         self.is_remote = is_remote
+        self.asked: deque[str] = deque()
+        self.later: _Later | None = None
 
 
 class DashboardServer:
@@ -70,25 +78,48 @@ class DashboardServer:
     def received(self, peer: Peer, chunk: bytes) -> None:
         """Answer the lines that are complete."""
         client = self._clients[peer]
-        for line in client.lines.feed(chunk):
-            self._answer(peer, client, line.decode("utf-8", "replace").strip())
-            if not peer.is_open:
-                return
-        if client.lines.is_overlong:
+        client.asked.extend(line.decode("utf-8", "replace").strip() for line in client.lines.feed(chunk))
+        self._go_on(peer, client)
+        if peer.is_open and (client.lines.is_overlong or len(client.asked) > _N_LINES):
             peer.close()
+
+    def tick(self) -> None:
+        """Give the replies that are known by now."""
+        for peer, client in [(p, c) for p, c in self._clients.items() if c.later is not None]:
+            self._go_on(peer, client)
 
     def closed(self, peer: Peer) -> None:
         """Forget the client."""
         del self._clients[peer]
 
+    def _go_on(self, peer: Peer, client: _Client) -> None:
+        """Answer what was asked, in order, as far as the replies are known."""
+        while peer.is_open:
+            later = client.later
+            if later is not None:
+                reply = later()
+                if reply is None:
+                    return
+                client.later = None
+                peer.reply(f"{reply}\n".encode())
+            elif client.asked:
+                self._answer(peer, client, client.asked.popleft())
+            else:
+                return
+
     def _answer(self, peer: Peer, client: _Client, line: str) -> None:
         if line.lower() == "quit":
+            client.asked.clear()
             peer.reply(b"Disconnected\n")
             peer.close_when_sent()
+            return
+        reply = self._reply(client, line)
+        if isinstance(reply, str):
+            peer.reply(f"{reply}\n".encode())
         else:
-            peer.reply(f"{self._reply(client, line)}\n".encode())
+            client.later = reply
 
-    def _reply(self, client: _Client, line: str) -> str:
+    def _reply(self, client: _Client, line: str) -> str | _Later:
         words, rest = self._split(line)
         command = self._commands.get(words)
         if command is None:
@@ -165,6 +196,15 @@ def _programs(target: DashboardTarget) -> dict[str, _Command]:
     def act(words: str, do: Callable[[], Outcome], done: str) -> _Command:
         return _Command(lambda _rest: _said(do(), done, f"Failed to execute: {words}"), is_acting=True)
 
+    def play(_rest: str) -> _Later:
+        awaited = target.play()
+
+        def reply() -> str | None:
+            outcome = awaited()
+            return None if outcome is None else _said(outcome, "Starting program", "Failed to execute: play")
+
+        return reply
+
     def load(what: str, do: Callable[[str], Outcome], failed: str) -> _Command:
         def answer(path: str) -> str:
             outcome = do(path)
@@ -175,7 +215,7 @@ def _programs(target: DashboardTarget) -> dict[str, _Command]:
         return _Command(answer, is_acting=True)
 
     return {
-        "play": act("play", target.play, "Starting program"),
+        "play": _Command(play, is_acting=True),
         "stop": act("stop", target.stop, "Stopped"),
         "pause": act("pause", target.pause, "Pausing program"),
         "load": load("program", target.load, "Error while loading program"),

@@ -1,11 +1,12 @@
 """What the dashboard server needs of the robot behind it."""
 
+from collections.abc import Callable
 from enum import Enum
-from typing import Protocol
+from typing import Protocol, TypeAlias
 
 import msgspec
 
-__all__ = ["DashboardStatus", "DashboardTarget", "Outcome", "PanelTarget", "PowerTarget", "ProgramTarget"]
+__all__ = ["Awaited", "DashboardStatus", "DashboardTarget", "Outcome", "PanelTarget", "PowerTarget", "ProgramTarget"]
 
 
 class Outcome(Enum):
@@ -15,6 +16,10 @@ class Outcome(Enum):
     FAILED = "failed"
     NOT_FOUND = "not found"
     TOO_EARLY = "too early"
+
+
+Awaited: TypeAlias = Callable[[], Outcome | None]
+"""Asked again and again, it returns how a request ended, None until that is known."""
 
 
 class DashboardStatus(msgspec.Struct, frozen=True, kw_only=True):
@@ -84,8 +89,8 @@ class PowerTarget(Protocol):
 class ProgramTarget(Protocol):
     """Programs."""
 
-    def play(self) -> Outcome:
-        """Start the loaded program, or resume a paused one."""
+    def play(self) -> Awaited:
+        """Start the loaded program, or resume a paused one; return what tells whether it began."""
         ...
 
     def stop(self) -> Outcome:

@@ -94,7 +94,8 @@ class Wires:
         self._reactor.poll()
 
     def tick(self, control_step: int) -> None:
-        """Send the packages that are due in this 2 ms step."""
+        """Send the packages that are due in this 2 ms step, and replies that waited."""
+        self._dashboard.tick()
         self.rtde.tick(control_step)
         self.states.tick(control_step)
 

@@ -8,6 +8,7 @@ import pytest
 from sim_twin.controller.builtins import program_builtins
 from sim_twin.controller.script import Interpreter, Status, parse_program
 from sim_twin.controller.script.builtins import Sockets
+from sim_twin.controller.wire import ControllerVersion
 from tests.support.virtual_robot import make_robot
 
 N_DRAWS = 25
@@ -23,7 +24,7 @@ OUR_WORDS = ("expected", " misses the argument", "inverse kinematics: ", "singul
 
 @pytest.fixture(scope="module")
 def robot():
-    return make_robot()
+    return make_robot(version=ControllerVersion(minor=99))
 
 
 def said(robot, builtins, text):
@@ -63,7 +64,9 @@ def test_no_argument_brings_out_anything_but_plain_words(robot):
         ("force_mode(p[0,0,0,0,0,0], [0,0,1,0,0,0], [0,0,0,0,0,0], 9, [1,1,1,1,1,1])", "a type from 1 to 3, got 9"),
         (f"set_payload(1, [{NOT_A_NUMBER}, 0, 0])", "set_payload(): expected 3 finite numbers"),
         (f"set_payload_cog([0, {NOT_A_NUMBER}, 0])", "set_payload_cog(): expected 3 finite numbers"),
-        (f"set_payload({INFINITE})", "expected 0 kg or more"),
+        (f"set_payload({INFINITE})", "expected 0 to 100 kg"),
+        ("set_payload(1e300)", "expected 0 to 100 kg"),
+        ("set_payload(1, [0, 1e300, 0])", "expected a centre of gravity within 10 m"),
         (f"set_gravity([0, 0, {NOT_A_NUMBER}])", "set_gravity(): expected 3 finite numbers"),
     ],
 )

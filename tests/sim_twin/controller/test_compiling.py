@@ -2,7 +2,7 @@
 
 from threading import Event
 
-from sim_twin.controller.compiling import N_WAITING, Mistake, ThreadCompiler
+from sim_twin.controller.compiling import N_WAITING, Mistake, Start, ThreadCompiler
 
 
 def test_a_flood_of_programs_is_turned_away_and_the_rest_compiled_in_order():
@@ -14,13 +14,13 @@ def test_a_flood_of_programs_is_turned_away_and_the_rest_compiled_in_order():
 
     compiler = ThreadCompiler(wait_for_the_gate)
     for k in range(N_WAITING + 20):
-        compiler.submit(f"def p{k}():\n  x = 1\nend\n")
+        compiler.submit(f"def p{k}():\n  x = 1\nend\n", Start())
     turned_away = []
     while (done := compiler.take()) is not None:
-        turned_away.append(done)
+        turned_away.append(done[0])
     assert 19 <= len(turned_away) <= 20  # the first may be with the compiler already
     assert all(isinstance(done, Mistake) and "wait" in done.message for done in turned_away)
     gate.set()
     compiler.close()
-    names = [compiler.take().name for _ in range(N_WAITING)]
+    names = [compiler.take()[0].name for _ in range(N_WAITING)]
     assert names == [f"p{k}" for k in range(N_WAITING)]

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from sim_twin.controller.builtins import program_builtins
+from sim_twin.controller.builtins.versions import ANY, SINCE
 from sim_twin.controller.control_port import CONTROL
 from sim_twin.controller.outputs import COPIES
 from sim_twin.controller.script.builtins import Sockets
@@ -48,9 +49,21 @@ def test_every_row_says_exact_approximate_and_how_or_absent(section):
     assert [row for row in rows(section) if not row[-1].startswith(STATES)] == []
 
 
-def test_every_builtin_function_of_the_code_is_in_the_table_and_no_other(robot):
+def test_every_builtin_function_of_the_code_is_in_the_table_and_no_other():
+    robot = make_robot(version=ControllerVersion(minor=99))
     functions = program_builtins(robot.machine, Sockets(slice_s=0.002))
     assert names("URScript built-in functions", there=True) == set(functions)
+
+
+def as_told(since):
+    """Return a first version as the table has it."""
+    return "never" if since is None else "any" if since == ANY else ".".join(map(str, since))
+
+
+def test_every_builtin_function_is_told_with_the_version_that_brought_it():
+    told = {name: row[1] for row in rows("URScript built-in functions") for name in quoted(row[0])}
+    known = {name: f"{as_told(e_series)}; CB3 {as_told(cb3)}" for name, (e_series, cb3) in SINCE.items()}
+    assert told == dict.fromkeys(told, "any") | known
 
 
 def test_every_dashboard_command_is_in_the_table_and_what_is_absent_is_absent(robot):

@@ -22,6 +22,10 @@ OFF_LAG_S, OFF_SHARE = 0.04, 0.2
 """How far the measured lag may be off the law, and what is left of the swing's size when it is taken off."""
 
 
+N_TRIES, WAITED_SHARE = 3, 0.4
+"""Controller, client and fuzz on two processors wait for one another a third of the time at most; more is of others."""
+
+
 @pytest.fixture(scope="module")
 def station():
     with make_station(HOST) as made:
@@ -81,25 +85,53 @@ def resident_mb(pid):
     return int(Path(f"/proc/{pid}/statm").read_text().split()[1]) * 4096 / 1e6
 
 
+def waited_s(pid):
+    """Return how long a process's main thread was ready to run and did not (proc_pid_schedstat, second field)."""
+    return int(Path(f"/proc/{pid}/schedstat").read_text().split()[1]) * 1e-9
+
+
 def check(station, kind, n):
+    """Judge what came of it; where others had the processors, the pace of controller and client says nothing."""
+    told = []
+    while len(told) < N_TRIES:
+        wrong, share = bear(station, kind, n)
+        if not wrong:
+            return
+        told.append(f"{wrong.splitlines()[0]} ({share:.0%} of the time was waited for a processor)")
+        if share < WAITED_SHARE:
+            pytest.fail("; ".join(told))
+    pytest.skip(f"not judged, this machine was busy: {'; '.join(told)}")
+
+
+def bear(station, kind, n):
+    """Send malformed messages beside a client; return what is wrong with its pace, and who waited how much of it."""
     station.recover()
     before_mb = resident_mb(station.process.pid)
     alone = Servoing(station)
     pace_alone = alone.run(lambda: True)
     beside = Servoing(station)
     beside.phase = alone.phase
+    pids = station.process.pid, "self"
+    before_s, begun_s = [waited_s(pid) for pid in pids], time.monotonic()
     with FuzzBeside(HOST, kind, n) as fuzzing:
         pace = beside.run(fuzzing.done)
+    waits_s = [waited_s(pid) - before for pid, before in zip(pids, before_s, strict=True)]
+    share = max(waits_s) / (time.monotonic() - begun_s)
+    is_running = station.control.isProgramRunning()
+    station.control.servoStop()  # before anything is judged: the next test would move the arm beside a servo thread
     assert fuzzing.n_sent == n
     assert all(beside.taken)
-    assert station.control.isProgramRunning()
+    assert is_running
     assert np.all(np.diff(beside.seen_s) >= 0.0)
-    assert_follows(beside.seen_s, beside.asked_rad, beside.measured_rad)
     assert max(beside.others_rad) < 2e-3
-    assert pace > 0.5 * pace_alone
-    station.control.servoStop()
     assert resident_mb(station.process.pid) - before_mb < GROWTH_MB
     answers(station)
+    try:
+        assert_follows(beside.seen_s, beside.asked_rad, beside.measured_rad)
+        assert pace > 0.5 * pace_alone
+    except AssertionError as error:
+        return str(error) or "it does not follow", share
+    return "", share
 
 
 def answers(station):

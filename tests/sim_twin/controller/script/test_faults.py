@@ -70,6 +70,27 @@ def test_the_line_of_an_error_inside_a_function_is_inside():
     assert error_of("def prog():\n def f():\n  note(1)\n  x = 1 / 0\n end\n f()\nend")[1] == 4
 
 
+@pytest.mark.parametrize(
+    ("text", "place"),
+    [
+        ("def prog():\n   x = 1 / 0\nend", (2, 4)),
+        ("def prog():\n note(1); x = 1 / 0\nend", (2, 11)),
+        ("def prog():\n global x = acos(2)\nend", (2, 2)),
+        ("def prog():\n x = 1 +\n   acos(2)\nend", (2, 2)),
+        ("def prog():\n if False:\n  note(1)\n elif 1 / 0:\n  note(2)\n end\nend", (4, 2)),
+        ("def prog():\n  while 1 / 0:\n   note(1)\n end\nend", (2, 3)),
+        ("def prog():\n def f():\n  note(1)\n  return 1\n end\n x = f() / 0\nend", (6, 2)),
+        ("def prog():\n def f():\n  sync()\n  return 1\n end\n   x = f() / 0\nend", (6, 4)),
+        ("def prog():\n def f():\n  note(1)\n    return 1 / 0\n end\n f()\nend", (4, 5)),
+        ("def prog():\n thread t():\n  sync()\n    kill 1.5\n end\n run t()\n sync()\n sync()\nend", (4, 5)),
+        ("x = 1\nx = 1 / 0\n", (2, 1)),
+    ],
+)
+def test_the_place_of_a_mistake_is_where_its_statement_begins(text, place):
+    error = ScriptRun(text).finish().interpreter.error
+    assert (error.line, error.column) == place
+
+
 def test_a_builtin_that_fails_after_some_slices_fails_at_its_call():
     def lift(height):
         yield

@@ -4,7 +4,7 @@ from hypothesis import strategies as st
 
 from sim_twin.controller.script import Interpreter, Program, ScriptSyntaxError, Status, parse_program
 from sim_twin.controller.script.lexer import KEYWORDS, tokens_of
-from sim_twin.controller.script.syntax import Assign, Binary, Call, Constant, Evaluate, Logic, Name, PoseLiteral
+from sim_twin.controller.script.syntax import Assign, Binary, Call, Constant, Evaluate, Logic, Name, Place, PoseLiteral
 from tests.support.scripts import program
 
 WORDS = [
@@ -155,9 +155,9 @@ def test_the_tree_of_a_few_statements_by_hand():
     both = Logic("and", (Name("c", 3, 15), Name("d", 3, 21)))
     chain = Logic("or", (Name("a", 3, 5), Name("b", 3, 10), both))
     assert parsed.body == (
-        Assign(1, "", Name("x", 1, 1), Binary("+", Constant(1), product)),
-        Evaluate(2, Call("f", (Name("a", 2, 3),), (("b", six),), 2, 1)),
-        Assign(3, "", Name("z", 3, 1), chain),
+        Assign(Place(1, 1), "", Name("x", 1, 1), Binary("+", Constant(1), product)),
+        Evaluate(Place(2, 1), Call("f", (Name("a", 2, 3),), (("b", six),), 2, 1)),
+        Assign(Place(3, 1), "", Name("z", 3, 1), chain),
     )
 
 

@@ -178,6 +178,44 @@ def test_user_roles_are_of_a_cb3_and_know_no_remote_control(make_bench):
     assert client.ask("is in remote control") == "could not understand: is in remote control"
 
 
+def test_play_is_answered_once_it_is_known_whether_the_program_began(bench):
+    client, other = bench.dashboard(), bench.dashboard()
+    bench.robot.outcome = None
+    client.send(b"play\nrobotmode\nrunning\n")
+    assert client.silent()
+    assert other.ask("robotmode") == "Robotmode: RUNNING"
+    bench.wires.tick(1)
+    assert client.silent()
+    bench.robot.outcome = Outcome.FAILED
+    bench.wires.tick(2)
+    told = [client.line() for _ in range(3)]
+    assert told == ["Failed to execute: play", "Robotmode: RUNNING", "Program running: false"]
+
+
+def test_who_asks_on_and_on_behind_a_reply_that_waits_is_cut_off(bench):
+    client, other = bench.dashboard(), bench.dashboard()
+    bench.robot.outcome = None
+    client.send(b"play\n" + b"running\n" * 90)
+    assert client.silent()
+    client.send(b"running\n" * 20)
+    assert client.ended()
+    assert other.ask("running") == "Program running: false"
+
+
+def test_a_client_that_goes_while_its_reply_waits_is_forgotten(bench):
+    client = bench.dashboard()
+    bench.robot.outcome = None
+    client.send(b"play\n")
+    assert client.silent()
+    client.socket.close()
+    other = bench.dashboard()
+    bench.robot.outcome = Outcome.DONE
+    for step in range(5):
+        bench.wires.poll()
+        bench.wires.tick(step)
+    assert other.ask("play") == "Starting program"
+
+
 def test_lines_may_come_in_pieces_or_together(bench):
     client = bench.dashboard()
     for byte in b"robotmode\r\n":

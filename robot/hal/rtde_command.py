@@ -1,0 +1,127 @@
+"""Command of an arm over RTDE: the client whose program obeys, and the outputs, from taking it to giving it up.
+
+The client uploads a script and stops whatever program runs, so it is made when somebody takes command, after arming. It
+never outlives a stop or a stale state, because it would go on by itself where it was left: it repeats a command after a
+reconnection, and the script acts on the registers' last values.
+"""
+
+from collections.abc import Callable
+from contextlib import suppress
+from time import monotonic_ns
+from typing import TypeAlias
+
+from dashboard_client import DashboardClient
+from rtde_control import RTDEControlInterface
+from rtde_receive import RTDEReceiveInterface
+
+from config.arm import Tool
+from robot.hal.pins import Pins
+from robot.hal.protocols import Clock
+from robot.hal.rtde_links import RtdeLinks
+from robot.hal.rtde_outputs import N_OUTPUTS, DigitalOutputs
+from robot.hal.rtde_set_up import arm_watchdog, end_program, prove_watchdog, set_tool
+from robot.hal.ur_calls import bounded
+
+__all__ = ["ALL_BITS", "RATE_HZ", "Readers", "RtdeCommand"]
+
+RATE_HZ = 500.0
+TAKE_S = 8.0
+"""Longer than the client takes to be made, or to give up. One that lost its link meanwhile may wait for ever."""
+ALL_BITS = (1 << N_OUTPUTS) - 1
+
+Readers: TypeAlias = tuple[RTDEReceiveInterface, DashboardClient]
+
+
+class RtdeCommand:
+    """What holds command of one arm.
+
+    Args:
+        address: host or IP address of the controller.
+        tool: what the controller has to reckon with.
+        links: of this arm's clients.
+        pins: the control box's wiring.
+        readers: returns the clients that read, once there are any.
+
+    Attributes:
+        control: The client whose program obeys; None while nobody has command.
+        outputs: The outputs it drives; likewise.
+    """
+
+    def __init__(
+        self, *, address: str, tool: Tool, links: RtdeLinks, pins: Pins, readers: Callable[[], Readers]
+    ) -> None:
+        self._address, self._tool = address, tool
+        self._links, self._pins, self._readers = links, pins, readers
+        self.control: RTDEControlInterface | None = None
+        self.outputs: DigitalOutputs | None = None
+
+    def take(self, clock: Clock) -> None:
+        """Upload the program, have its watchdog proven, upload it anew, set payload and tool, arm the watchdog last.
+
+        Args:
+            clock: the arm's ticks.
+
+        Raises:
+            ArmRefusedError: the controller did not take something, or its watchdog does not work.
+            StaleStateError: a link was lost.
+            RuntimeError: the client's own.
+        """
+        receive, _ = self._readers()
+        self._links.look()
+        self._links.begin_guard(receive.getTimestamp)
+        self.control = self._connected()
+        prove_watchdog(self.control, receive, clock)
+        self._links.require()
+        self._links.pause()
+        self.control = None
+        self._links.look()
+        self.control = self._connected()
+        self._set_up(self.control, receive, clock)
+        self._links.require()
+
+    def put(self, signals: int) -> int | None:
+        """Switch the outputs that differ; return the first terminal that the controller did not take, None for none."""
+        assert self.outputs is not None, "take made it"
+        return self.outputs.put(self._pins.pins_out(signals, self.outputs.bits, now_ns=monotonic_ns()))
+
+    def drop(self, clock: Clock, *, is_in_traceback: bool = False) -> bool:
+        """End the program and forget its client: it must never get the chance to go on by itself.
+
+        A client disconnects when its last reference goes, and sleeps half a second each time it does. So it is told to
+        only where a traceback keeps it alive. Until it goes its link is watched: one that was lost is kept.
+
+        Returns:
+            Whether the program has ended.
+        """
+        is_ended = True
+        if self.control is not None:
+            receive, dashboard = self._readers()
+            is_ended = end_program(self.control, receive, dashboard, clock)
+        outputs, self.outputs = self.outputs, None
+        if outputs is not None:
+            with suppress(RuntimeError):
+                outputs.put(self._pins.rested(outputs.bits))
+        if self._links.is_lost_now:
+            return False
+        self._links.forget()
+        if outputs is not None:
+            outputs.close()
+        control, self.control = self.control, None
+        if control is not None and is_in_traceback:
+            with suppress(RuntimeError):
+                control.disconnect()
+        return is_ended
+
+    def _connected(self) -> RTDEControlInterface:
+        with bounded(TAKE_S if self._links.when_lost is not None else None):
+            control = RTDEControlInterface(self._address, RATE_HZ, RTDEControlInterface.FLAG_UPLOAD_SCRIPT)
+        self._links.look()
+        return control
+
+    def _set_up(self, control: RTDEControlInterface, receive: RTDEReceiveInterface, clock: Clock) -> None:
+        """Set payload and tool centre point, open the outputs, arm the watchdog last."""
+        set_tool(control, receive, clock, self._tool)
+        self.outputs = DigitalOutputs(self._address, bits=receive.getActualDigitalOutputBits() & ALL_BITS)
+        self._links.look()
+        self._pins.forget()
+        arm_watchdog(control, receive, clock)  # from here on somebody must write

@@ -1,0 +1,63 @@
+"""What the suite does with a failure while the machine stalls: it is repeated, if there is a world to repeat it on."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+STALLING = """
+from itertools import count
+
+from tests.contract import conftest as suite
+from tests.contract.conftest import *  # noqa: F403
+
+now = count()
+suite._waited_s = lambda: float(next(now))
+
+
+class Shut:
+    is_lock_step = False
+
+    def __init__(self, *_):
+        raise OSError("its port is taken")
+
+
+class Open:
+    is_lock_step, n_renewed = False, 0
+
+    def __init__(self, *_):
+        self.resolved = None
+
+    def renew(self):
+        Open.n_renewed += 1
+
+    def close(self):
+        pass
+
+
+suite.WORLDS["virtual_lab"] = {kind}
+"""
+
+
+@pytest.mark.parametrize(
+    ("kind", "told"), [("Shut", "OSError: its port is taken"), ("Open", "1 passed")], ids=["shut", "open"]
+)
+def test_a_failure_is_repeated_where_a_world_stands_and_told_as_it_is_where_none_opened(tmp_path, kind, told):
+    (tmp_path / "conftest.py").write_text(STALLING.replace("{kind}", kind), encoding="utf-8")
+    body = "def test_once(world):\n    assert world.n_renewed == 1\n"
+    (tmp_path / "test_once.py").write_text(body, encoding="utf-8")
+    command = ["-m", "pytest", "-q", "-p", "no:cacheprovider", "-k", "virtual_lab", "--rootdir", str(tmp_path), "."]
+    said = subprocess.run(
+        [sys.executable, *command],
+        cwd=tmp_path,
+        env=os.environ | {"PYTHONPATH": str(ROOT)},
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+    ).stdout
+    assert told in said
+    assert "KeyError" not in said

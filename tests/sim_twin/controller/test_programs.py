@@ -1,0 +1,148 @@
+"""Programs of the virtual robot: what starts, pauses, stops and replaces them. Without ports, the same every time."""
+
+import math
+
+import pytest
+
+from sim_twin.controller.compiling import InlineCompiler, ThreadCompiler
+from sim_twin.controller.states import Event, RuntimeState, SafetyMode
+from sim_twin.controller.wire import Outcome
+from tests.support.virtual_robot import FOREVER, ended, lines, make_robot, run, started, state_of
+
+STOPPED, PLAYING, PAUSED = RuntimeState.STOPPED, RuntimeState.PLAYING, RuntimeState.PAUSED
+
+
+def test_the_same_program_moves_the_same_way_twice():
+    ends = []
+    for _ in range(2):
+        robot = started("def f():\n q = get_actual_joint_positions()\n q[0] = q[0] + 0.2\n movej(q, a=3, v=1)\nend\n")
+        n = ended(robot)
+        ends.append((n, robot.machine.world.data.qpos.tolist()))
+    assert ends[0] == ends[1]
+
+
+def test_a_def_replaces_and_a_sec_runs_beside():
+    robot = started(FOREVER)
+    robot.submit_script("sec side():\n set_digital_out(3, True)\nend\n")
+    run(robot, 2)
+    assert robot.programs.main.name == "waits"
+    assert robot.machine.world.digital_out == 1 << 3
+    robot.submit_script("def other():\n while True:\n  sync()\n end\nend\n")
+    run(robot, 10)
+    assert robot.programs.main.name == "other"
+    assert state_of(robot) is PLAYING
+
+
+def test_a_speed_ends_with_its_program():
+    robot = started("def f():\n speedj([0.3, 0, 0, 0, 0, 0], 2)\nend\n")
+    ended(robot)
+    run(robot, 100)
+    before = robot.machine.world.data.qpos[0]
+    run(robot, 50)
+    assert abs(robot.machine.world.data.qpos[0] - before) < 1e-4
+
+
+def test_two_threads_that_move_end_the_program():
+    robot = started(
+        "def f():\n thread t():\n  speedj([0.1,0,0,0,0,0],1,1)\n end\n sync()\n run t()\n"
+        " speedj([0,0.1,0,0,0,0],1,1)\nend\n"
+    )
+    ended(robot)
+    assert any("another thread is already controlling the robot" in line for line in lines(robot))
+
+
+def test_a_watchdog_stops_and_a_write_keeps_it_quiet():
+    robot = started(
+        'def f():\n rtde_set_watchdog("input_int_register_3", 50, "stop")\n while True:\n  sync()\n end\nend\n'
+    )
+    for k in range(100):
+        if k % 10 == 0:
+            robot.machine.write("input_int_register_3", k)
+        robot.step()
+    assert state_of(robot) is PLAYING
+    run(robot, 12)
+    assert state_of(robot) is STOPPED
+
+
+def test_the_dashboard_plays_pauses_and_stops_what_is_loaded():
+    robot = make_robot()
+    robot.programs.shelf["/programs/a.urp"] = FOREVER
+    panel = robot.panel
+    assert panel.play()() is Outcome.FAILED
+    assert panel.load("/programs/b.urp") is Outcome.NOT_FOUND
+    assert panel.load("/programs/a.urp") is Outcome.DONE
+    awaited = panel.play()
+    assert awaited() is None
+    run(robot, 3)
+    assert awaited() is Outcome.DONE
+    assert panel.status().program_state == "PLAYING"
+    assert panel.pause() is Outcome.DONE
+    run(robot, 3)
+    assert state_of(robot) is PAUSED
+    assert panel.play()() is Outcome.DONE
+    run(robot, 3)
+    assert state_of(robot) is PLAYING
+    assert panel.stop() is Outcome.DONE
+    ended(robot)
+
+
+@pytest.mark.parametrize("text", ["def f():\n if\nend\n", "def f():\n nobody()\nend\n"], ids=["syntax", "name"])
+@pytest.mark.parametrize("compiler", [InlineCompiler, ThreadCompiler])
+def test_play_fails_where_the_program_does_not_compile(text, compiler):
+    robot = make_robot(compiler=compiler)
+    robot.programs.shelf["/programs/a.urp"] = text
+    robot.panel.load("/programs/a.urp")
+    awaited = robot.panel.play()
+    assert awaited() is None
+    run(robot, 5000, awaited)
+    assert awaited() is Outcome.FAILED
+    assert state_of(robot) is STOPPED
+    robot.close()
+
+
+def test_play_fails_where_the_arm_is_stopped_before_the_program_begins():
+    robot = make_robot()
+    robot.programs.shelf["/programs/a.urp"] = FOREVER
+    robot.panel.load("/programs/a.urp")
+    awaited = robot.panel.play()
+    robot.programs.handle(Event.PROTECTIVE_STOP)
+    run(robot, 3)
+    assert awaited() is Outcome.FAILED
+
+
+def test_play_fails_where_another_program_comes_before_it_has_begun():
+    robot = started(FOREVER)
+    first, second = robot.programs.submit(FOREVER), robot.programs.submit(FOREVER)
+    assert (first.has_begun, second.has_begun) == (None, None)
+    run(robot, 10)
+    assert (first.has_begun, second.has_begun) == (False, True)
+
+
+def test_local_control_refuses_programs():
+    robot = make_robot()
+    robot.machine.modes.is_remote = False
+    robot.submit_script(FOREVER, source=object())
+    run(robot, 3)
+    assert state_of(robot) is STOPPED
+
+
+def test_a_paused_program_does_not_starve_its_watchdog():
+    robot = started(
+        'def f():\n rtde_set_watchdog("input_int_register_3", 50, "stop")\n while True:\n  sync()\n end\nend\n'
+    )
+    robot.programs.handle(Event.SAFEGUARD_OPENED)
+    run(robot, 200)
+    assert state_of(robot) is PAUSED
+    assert robot.machine.modes.safety is SafetyMode.SAFEGUARD_STOP
+
+
+def test_a_target_that_is_no_number_moves_nothing():
+    robot = make_robot()
+    robot.machine.write("input_double_register_0", math.nan)
+    robot.submit_script(
+        "def f():\n q = get_actual_joint_positions()\n q[0] = read_input_float_register(0)\n servoj(q)\nend\n"
+    )
+    before = robot.machine.world.data.qpos[:6].copy()
+    run(robot, 300)
+    assert state_of(robot) is not PLAYING
+    assert robot.machine.world.data.qpos[:6] == pytest.approx(before, abs=1e-3)
