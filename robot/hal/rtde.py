@@ -100,7 +100,7 @@ class RtdeArm:
         """
         if self._receive is not None:
             return
-        facts = read_facts(self.address)
+        facts = read_facts(self.address, greeted=check_version)  # PolyScope X has no dashboard that could be asked
         dashboard = DashboardClient(self.address)
         with named("dashboard", self.address):
             dashboard.connect()
