@@ -97,10 +97,11 @@ class RtdeArm:
         Raises:
             WireError: somebody does not answer.
             RobotConfigError: another arm than the rig names, another model or software than this backend is for.
+            ArmRefusedError: the arm is stopped, and its hand without power.
         """
         if self._receive is not None:
             return
-        facts = read_facts(self.address)
+        facts = read_facts(self.address, greeted=check_version)  # PolyScope X has no dashboard that could be asked
         dashboard = DashboardClient(self.address)
         with named("dashboard", self.address):
             dashboard.connect()
@@ -157,12 +158,13 @@ class RtdeArm:
 
         Raises:
             StaleStateError: not connected, the link was cut, or the controller's own time has stood still for 50 ms.
+            ArmRefusedError: the hand does not answer because the arm is stopped: where drives are cut it has no power.
             WireError: the hand does not answer.
         """
         receive, _ = self._reading()
         self._require_link()
         self._note_freshness(receive)
-        grip = self._grip_now()
+        grip = self._grip_where_powered()
         self._runtime = int(receive.getRuntimeState())
         modes = receive.getRobotMode(), receive.getSafetyStatusBits()
         if modes != self._modes:
@@ -283,6 +285,18 @@ class RtdeArm:
         """Let the hand have its turn after the command has gone out, and none in the next read."""
         self._gripper.poll()
         self._is_hand_asked = True
+
+    def _grip_where_powered(self) -> GripState:
+        """Return what the hand says; of an arm that does not run the stop is told, not the hand that it leaves dead."""
+        try:
+            return self._grip_now()
+        except WireError as error:
+            status = self.status()
+            is_running = mode_of(status.robot_mode, status.safety_bits) is ArmMode.RUNNING
+            if is_running or isinstance(error, StaleStateError):
+                raise
+            why = why_refused(status)
+            raise ArmRefusedError(f"arm: expected it running and its hand powered, came: {why}; {error}") from error
 
     def _grip_now(self) -> GripState:
         """Return what the hand says; after a pause wait for what it says now, the next answer being of before."""

@@ -1,28 +1,31 @@
-"""The primary interface, as far as it tells what the arm is made of: calibrated DH and the limits set on it.
+"""The primary interface, as far as it tells the software and what the arm is made of: calibrated DH, limits set on it.
 
 Layout: UR, "Remote control via TCP/IP" (client interfaces): a package is a uint32 size and a uint8 type; robot state
-(type 16) is a sequence of sub-packages of the same form. Numbers are big-endian.
+(type 16) is a sequence of sub-packages of the same form. What greets a client is a robot message (type 20): a uint64
+stamp, a source, a type (3), a counted name, and the version as two uint8 and two int32. Numbers are big-endian.
 """
 
 import socket
 import struct
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import msgspec
 
 from robot.errors import WireError
 from robot.messages import Vec6
 
-__all__ = ["PRIMARY_PORT", "ArmFacts", "parse_facts", "read_facts"]
+__all__ = ["PRIMARY_PORT", "ArmFacts", "parse_facts", "parse_greeting", "read_facts"]
 
 PRIMARY_PORT = 30001
 ROBOT_STATE, JOINTS, CARTESIAN, KINEMATICS, CONFIGURATION = 16, 1, 4, 5, 6
+ROBOT_MESSAGE, VERSION = 20, 3
 JOINT_BYTES = 41
 LARGEST = 1 << 16
 _HEADER = struct.Struct(">IB")
 _VEC6 = struct.Struct(">6d")
 _DOUBLE = struct.Struct(">d")
 _RANGES = struct.Struct(">12d")
+_MESSAGE, _NUMBERS = struct.Struct(">QbBB"), struct.Struct(">BBi")
 
 
 class ArmFacts(msgspec.Struct, frozen=True, kw_only=True):
@@ -66,8 +69,32 @@ def parse_facts(package: bytes) -> ArmFacts | None:
     )  # fmt: skip
 
 
-def read_facts(host: str, *, timeout_s: float = 3.0, n_packages: int = 200) -> ArmFacts:
+def parse_greeting(package: bytes) -> tuple[int, ...] | None:
+    """Return the software's version, major, minor and bugfix, if a package is what greets a client."""
+    at = _HEADER.size
+    if len(package) < at + _MESSAGE.size or package[4] != ROBOT_MESSAGE:
+        return None
+    _, _, kind, n_name = _MESSAGE.unpack_from(package, at)
+    at += _MESSAGE.size + n_name
+    if kind != VERSION or len(package) < at + _NUMBERS.size:
+        return None
+    return _NUMBERS.unpack_from(package, at)
+
+
+def read_facts(
+    host: str,
+    *,
+    greeted: Callable[[tuple[int, ...]], object] | None = None,
+    timeout_s: float = 3.0,
+    n_packages: int = 200,
+) -> ArmFacts:
     """Connect, listen until the facts come, and disconnect. Sends nothing.
+
+    Args:
+        host: host or IP address of the controller.
+        greeted: takes the software's version, which comes first, and raises where nothing more is to be asked.
+        timeout_s: how long to wait for each answer.
+        n_packages: how many to look through.
 
     Raises:
         WireError: nobody listens, or the facts do not come.
@@ -75,7 +102,11 @@ def read_facts(host: str, *, timeout_s: float = 3.0, n_packages: int = 200) -> A
     try:
         with socket.create_connection((host, PRIMARY_PORT), timeout=timeout_s) as link:
             for _ in range(n_packages):
-                facts = parse_facts(_package(link))
+                package = _package(link)
+                version = parse_greeting(package)
+                if version is not None and greeted is not None:
+                    greeted(version)
+                facts = parse_facts(package)
                 if facts is not None:
                     return facts
     except OSError as error:

@@ -29,6 +29,10 @@ def controller(
         str, typer.Option("--cell", help="How the table is wired to the control box: a shipped cell's name or a file.")
     ] = "ur_box",
     script: Annotated[Path | None, typer.Option("--script", help="URScript file to run at the start.")] = None,
+    program: Annotated[
+        list[Path] | None,
+        typer.Option("--program", help="URScript file that the dashboard can load by its name; as many as you like."),
+    ] = None,
 ) -> None:
     """Run a virtual UR controller until Ctrl-C; unmodified clients connect to it."""
     if context.invoked_subcommand is not None:
@@ -46,6 +50,7 @@ def controller(
             is_powered=powered,
             is_any_host_allowed=allow_any,
             script=text,
+            shelf={path.name: path.read_text(encoding="utf-8") for path in program or []},
             bus=bus,
             cell=cell,
         )

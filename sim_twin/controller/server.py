@@ -44,6 +44,8 @@ class Setup(msgspec.Struct, frozen=True, kw_only=True):
     is_any_host_allowed: bool = False
     script: str = ""
     """Text of a program to run at the start."""
+    shelf: dict[str, str] = {}
+    """Texts of programs that the dashboard can load, by the name that it loads them by."""
     cell: str = ""
     """A shipped cell's name or a path: how the table is wired to the control box; straight through where empty."""
     bus: str = ""
@@ -102,6 +104,7 @@ class ControllerServer:
         self.robot = robot = VirtualRobot(
             world, version=version, is_powered=setup.is_powered, cell=cell, compiler=ThreadCompiler
         )
+        robot.programs.shelf.update(setup.shelf)
         self.wires = Wires(
             outputs=robot.outputs,
             inputs=robot.machine,

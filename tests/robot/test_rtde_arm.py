@@ -140,6 +140,17 @@ def test_a_program_that_a_protective_stop_has_paused_is_seen_to_end():
         assert is_confirmed
 
 
+def test_an_arm_whose_drives_are_cut_is_refused_for_its_stop_and_not_for_the_hand_that_has_no_power():
+    from robot.hal.rtde import RtdeArm
+
+    with ControllerProcess(Setup(host=own_address())) as controller:
+        controller.fault("violation")
+        arm = RtdeArm(arm=CONFIG, address=controller.host)
+        with pytest.raises(ArmRefusedError, match="came: safety violation"):
+            arm.connect()
+        arm.close()
+
+
 def test_a_program_that_only_a_person_can_end_is_no_confirmed_stop(controller, arm):
     with undisturbed():
         arm.engage()

@@ -2,6 +2,8 @@
 
 import math
 import socket
+from contextlib import suppress
+from threading import Thread
 
 import msgspec
 import pytest
@@ -9,9 +11,10 @@ import pytest
 from config.loader import load_arm
 from robot.errors import RobotConfigError, WireError
 from robot.hal.ur_checks import check_facts, check_pose, flange_pose
-from robot.hal.ur_primary import ArmFacts, parse_facts, read_facts
+from robot.hal.ur_primary import PRIMARY_PORT, ArmFacts, parse_facts, parse_greeting, read_facts
 from robot.kinematics import ToolChain
 from sim_twin.controller.wire.primary import pack_state
+from sim_twin.controller.wire.primary_messages import pack_text, pack_version
 from sim_twin.controller.wire.primary_state import (
     CartesianInfo,
     ConfigurationData,
@@ -21,6 +24,7 @@ from sim_twin.controller.wire.primary_state import (
     RobotModeData,
 )
 from sim_twin.controller.wire.version import ControllerVersion
+from tests.support.loopback import own_address
 
 ARM = load_arm("ur5e")
 Q = (0.3, -1.4, 1.7, -1.9, -1.5, 0.4)
@@ -123,3 +127,37 @@ def test_nobody_there_is_said():
         taken.bind(("127.0.4.9", 0))
         with pytest.raises(WireError, match=r"127\.0\.4\.9:30001"):
             read_facts("127.0.4.9", timeout_s=0.2)
+
+
+def test_the_greeting_tells_the_version_and_nothing_else_does():
+    greeting = pack_version(VERSION, stamp_us=7)
+    assert parse_greeting(greeting) == (5, 11, 6)
+    assert parse_greeting(pack_text("\x03 5.11", stamp_us=7)) is None
+    assert parse_greeting(package(facts())) is None
+    assert parse_greeting(greeting[:24]) is None
+
+
+@pytest.fixture
+def polyscope_x():
+    """The primary port of a controller that has neither dashboard nor gripper port, and otherwise the same arm."""
+    host, told = own_address(), pack_version(ControllerVersion(major=10, minor=8), stamp_us=1) + package(facts())
+    with socket.create_server((host, PRIMARY_PORT)) as listener:
+
+        def serve():
+            with suppress(OSError):  # nobody comes, or whoever came leaves with half of it unread
+                link, _ = listener.accept()
+                with link:
+                    link.sendall(told)
+                    link.recv(1)
+
+        listener.settimeout(10.0)
+        server = Thread(target=serve)
+        server.start()
+        yield host
+        server.join()
+
+
+def test_polyscope_x_is_refused_with_the_reason_before_its_missing_dashboard_is_asked(polyscope_x):
+    rtde = pytest.importorskip("robot.hal.rtde", reason="the genuine client comes with `pip install autotelic[lab]`")
+    with pytest.raises(RobotConfigError, match="PolyScope X"):
+        rtde.RtdeArm(arm=ARM, address=polyscope_x).connect()

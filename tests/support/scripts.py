@@ -111,3 +111,10 @@ def error_of(body: str, **builtins: Builtin) -> tuple[str, int]:
 def program(body: str) -> str:
     """Make statements a program; its name is on line 1, they begin on line 2."""
     return f"def prog():\n{body}\nend\n"
+
+
+def schedule(body, n_max=50, **builtins):
+    """Return what a body notes, each with its slice."""
+    run = ScriptRun(program(body), **builtins).finish(n_max)
+    assert run.interpreter.error is None
+    return run.by_slice

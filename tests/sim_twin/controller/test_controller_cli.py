@@ -14,6 +14,7 @@ from sim_twin.controller.cli import app
 from sim_twin.controller.control_port import CONTROL
 from sim_twin.controller.process import ControllerProcess, ControllerProcessError, ask_fault
 from sim_twin.controller.server import Setup
+from sim_twin.controller.wire.wires import DASHBOARD
 
 HOST = "127.0.0.9"
 RUN = [sys.executable, "-c", "from sim_twin.controller.cli import app; app()"]
@@ -25,14 +26,29 @@ def process():
         yield opened
 
 
+def said(host, *asked):
+    """Return the dashboard's answers, its greeting left out."""
+    with socket.create_connection((host, DASHBOARD), timeout=5.0) as connection:
+        heard = connection.makefile("rb")
+        connection.sendall("".join(f"{line}\n" for line in asked).encode())
+        return [heard.readline().decode().strip() for _ in range(len(asked) + 1)][1:]
+
+
 def test_a_controller_says_that_it_is_ready_and_ends_cleanly(tmp_path):
     script = tmp_path / "a.script"
     script.write_text("def f():\n set_digital_out(2, True)\nend\n")
-    command = [*RUN, "--host", "127.0.0.10", "--version", "5.23.0", "--script", str(script)]
+    shelved = tmp_path / "b.script"
+    shelved.write_text("def g():\n set_digital_out(3, True)\nend\n")
+    command = [*RUN, "--host", "127.0.0.10", "--version", "5.23.0", "--script", str(script), "--program", str(shelved)]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as running:
         assert running.stdout.readline() == "virtual UR5e 5.23.0 ready on 127.0.0.10\n"
         time.sleep(0.3)
         assert ask_fault("127.0.0.10", "truth")["digital_out"] == 1 << 2
+        assert said("127.0.0.10", "load a.script", "load b.script", "play") == [
+            "File not found: a.script", "Loading program: b.script", "Starting program",
+        ]  # fmt: skip
+        time.sleep(0.3)
+        assert ask_fault("127.0.0.10", "truth")["digital_out"] == 1 << 2 | 1 << 3
         running.send_signal(signal.SIGINT)
         out, err = running.communicate(timeout=10)
     assert running.returncode == 0, err
@@ -134,6 +150,7 @@ def test_the_greatest_faults_leave_the_controller_alive(process):
         (["--scenario", "nonsense"], "scenarios: expected"),
         (["--cell", "nonsense"], "cells: expected"),
         (["--script", "/nonsense"], "/nonsense"),
+        (["--program", "/absent"], "/absent"),
     ],
 )
 def test_a_wrong_argument_is_told_in_one_line(arguments, words):
