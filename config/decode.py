@@ -15,7 +15,7 @@ __all__ = ["decode", "nearest"]
 S = TypeVar("S", bound=msgspec.Struct)
 
 STEP = re.compile(r"\.([^.\[]+)|\[(\d+)\]")
-FAULT = re.compile(r"(?P<what>.*?)(?: - at `\$(?P<path>.*)`)?\Z", re.DOTALL)
+AT = " - at `$"
 UNKNOWN = re.compile(r"Object contains unknown field `(?P<key>.*)`", re.DOTALL)
 END = r"\Z"
 MISSING = re.compile(r"Object missing required field `(?P<key>.*)`")
@@ -41,17 +41,25 @@ def nearest(name: str, known: list[str] | tuple[str, ...]) -> str:
 
 def _explain(message: str, tree: Tree, kind: type[msgspec.Struct], file: str) -> ConfigError:
     """Return a validation message of msgspec in our words."""
-    fault = FAULT.fullmatch(message)
-    assert fault is not None
-    where, value, asked = _follow(fault["path"] or "", tree, inspect.type_info(kind))
-    if unknown := UNKNOWN.fullmatch(fault["what"]):
+    what, path = _split(message, tree)
+    where, value, asked = _follow(path, tree, inspect.type_info(kind))
+    if unknown := UNKNOWN.fullmatch(what):
         known = [field.name for field in _struct(asked).fields]
         got = f"the unknown key {shown(unknown['key'])}{nearest(unknown['key'], known)}"
         return ConfigError(file, where, f"the keys {', '.join(known)}", got)
-    if missing := MISSING.fullmatch(fault["what"]):
+    if missing := MISSING.fullmatch(what):
         field = next(field for field in _struct(asked).fields if field.name == missing["key"])
         return ConfigError(file, join(where, field.name), _expected(field.type), "no such key")
     return ConfigError(file, where, _expected(asked), shown(value))
+
+
+def _split(message: str, tree: Tree) -> tuple[str, str]:
+    """Return what is wrong and the path to it; keys and values in the message may look like a path themselves."""
+    at_root = UNKNOWN.fullmatch(message)
+    if at_root and isinstance(tree, dict) and at_root["key"] in tree:
+        return message, ""
+    what, _, path = message.rpartition(AT) if AT in message else (message, "", "`")
+    return what, path.removesuffix("`")
 
 
 def _follow(path: str, tree: Tree, asked: inspect.Type) -> tuple[str, Tree, inspect.Type]:

@@ -65,6 +65,7 @@ def check_fit(scenario: Scenario, arm: ArmConfig, file: str) -> None:
         if box.name in asked:
             _check_reach(arm, box.position_m, box.spread_m, f"boxes[{i}].position_m", file)
         _check_passable(arm, i, box, file)
+    _check_start_clear(scenario, arm, file)
 
 
 def _check_on_table(scenario: Scenario, footprint: Footprint, where: str, file: str) -> None:
@@ -132,6 +133,25 @@ def _check_start(scenario: Scenario, arm: ArmConfig, file: str) -> None:
             raise ConfigError(file, f"start.position_m[{axis}]", expected, f"{centre:g} ± {spread:g}")
 
 
+def _check_start_clear(scenario: Scenario, arm: ArmConfig, file: str) -> None:
+    """The open hand must begin above whatever it may stand over, upright lids counted."""
+    start, tool = scenario.start, arm.tool
+    hand = Footprint(
+        centre_m=start.position_m[:2],
+        spread_m=start.spread_m[:2],
+        radius_m=math.hypot(tool.stroke_m / 2 + tool.pad_size_m[0], tool.pad_size_m[1] / 2),
+    )
+    things = [(button.name, footprint_of_button(button), button.height_m) for button in scenario.buttons]
+    things += [(box.name, footprint_of_box(box, with_leaves=True), _top_m(box)) for box in scenario.boxes]
+    loose = [cylinder for cylinder in scenario.cylinders if cylinder.inside is None]
+    things += [(cylinder.name, footprint_of_cylinder(cylinder), cylinder.height_m) for cylinder in loose]
+    for name, footprint, top_m in things:
+        least_m = scenario.table.height_m + top_m + tool.tip_below_tcp_m + start.spread_m[2]
+        if start.position_m[2] <= least_m and clearance_m(hand, footprint) < -ROUNDING_M:
+            expected = f"more than {least_m:g}, so that the fingertips begin above {name}"
+            raise ConfigError(file, "start.position_m[2]", expected, f"{start.position_m[2]:g}")
+
+
 def _check_reach(
     arm: ArmConfig, centre_m: tuple[float, float], spread_m: tuple[float, float], where: str, file: str
 ) -> None:
@@ -191,13 +211,18 @@ def _check_room_for_hand(arm: ArmConfig, i: int, cylinder: Cylinder, box: Box, f
 
 def _check_passable(arm: ArmConfig, i: int, box: Box, file: str) -> None:
     """At travel height the fingertips must pass over a box's rim and over its upright leaves."""
-    top_m = box.height_m
-    if box.lid is not None:
-        top_m += leaf_length_m(box) * math.sin(min(box.lid.open_angle_rad, math.pi / 2))
+    top_m = _top_m(box)
     tip_m = arm.motion.heights_m[1] - arm.tool.tip_below_tcp_m
     if top_m >= tip_m:
         expected = f"below the fingertips at travel height, {tip_m:g}, open lid counted"
         raise ConfigError(file, f"boxes[{i}].height_m", expected, f"{top_m:g}")
+
+
+def _top_m(box: Box) -> float:
+    """Return how high a box comes above the table, its leaves at their highest."""
+    if box.lid is None:
+        return box.height_m
+    return box.height_m + leaf_length_m(box) * math.sin(min(box.lid.open_angle_rad, math.pi / 2))
 
 
 def _mm(length_m: float) -> str:

@@ -1,5 +1,7 @@
 """Whether a rule set fits a scenario: its outputs, its inputs, and whether every goal can still be reached."""
 
+import msgspec
+
 from config.cell import CellConfig
 from config.decode import nearest
 from config.errors import ConfigError
@@ -69,7 +71,9 @@ def check_reachable(scenario: Scenario, rules: RuleSet, where: str, file: str) -
     """
     missing = unreachable_goals(scenario, rules)
     if missing:
-        got = f"{rules.name}, under which {', '.join(missing)} cannot: what opens the lids in the way never holds"
+        off = [name for name, is_on in msgspec.structs.asdict(scenario.reflexes).items() if is_on is False]
+        why = f", or it takes a reflex that is off ({', '.join(off)})" if off else ""
+        got = f"{rules.name}, under which {', '.join(missing)} cannot: what opens the lids in the way never holds{why}"
         raise ConfigError(file, where, "rules under which every goal can be reached", got)
 
 

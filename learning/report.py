@@ -48,7 +48,8 @@ class Loaded(msgspec.Struct, frozen=True, kw_only=True):
     left_out: tuple[str, ...]
     """Of each run that cannot be read, what is wrong with it, in a line."""
     passed_over: tuple[str, ...]
-    """Of each folder beside them that is no run's but holds something of one, what it holds, in a line."""
+    """Of each folder beside them that is no run's but holds something of one, what it holds, in a line; and of each run
+    that was named before."""
 
     def lines(self) -> list[str]:
         """Return in words what was not read, a line each."""
@@ -163,12 +164,13 @@ def _refuse_strange(path: Path, rows: Sequence[GoalRow | EvaluationRow], n_goals
 def load_runs(paths: Sequence[Path]) -> Loaded:
     """Return the runs that paths name, run folders and folders of them, in order.
 
-    Inside a folder of runs those that cannot be read are left out.
+    Inside a folder of runs those that cannot be read are left out. A run that is named twice counts once.
 
     Raises:
         RunFolderError: a path names no run, or is itself the folder of a run that cannot be read.
     """
     runs: list[Run] = []
+    seen: set[Path] = set()
     damaged: list[str] = []
     passed_over: list[str] = []
     for path in paths:
@@ -176,6 +178,11 @@ def load_runs(paths: Sequence[Path]) -> Loaded:
         damaged += found.broken
         passed_over += found.passed_over
         for folder in found.folders:
+            whole = folder.path.resolve()
+            if whole in seen:
+                passed_over.append(f"{folder.path}: named before, counted once")
+                continue
+            seen.add(whole)
             try:
                 runs.append(load_run(folder))
             except RunFolderError as error:

@@ -55,6 +55,9 @@ TYPES = [
     case("not above", "arm", ["servo", "gain"], 0, "servo.gain", "a number from 100 up to 2000", "0"),
     case("choice", "learning", ["subgoal_selection", "kind"], "magic", "subgoal_selection.kind", "one of graph, q, q_hindsight", "'magic'"),
     case("goal kind", "scenario", ["goals", 0, "kind"], "pushed", "goals[0].kind", "one of pressed, grabbed, in_box", "'pushed'"),
+    case("key like a path", "rig", ["x` - at `$.foo"], 1, "", "the keys name, description, arm", "'x` - at `$.foo'"),
+    case("key like a path below", "scenario", ["boxes", 1, "lid", "x` - at `$.foo[3]"], 1, "boxes[1].lid", "the keys output", "'x` - at `$.foo[3]'"),
+    case("choice like a path", "scenario", ["goals", 0, "kind"], "x' - at `$.foo[3]`", "goals[0].kind", "one of pressed, grabbed, in_box", "x' - at `$.foo[3]`"),
     case("name form", "rules", ["name"], "My Rules", "name", "like [a-z][a-z0-9_]*", "'My Rules'"),
     case("name with a line end", "rules", ["name"], "paper\n", "name", "like [a-z][a-z0-9_]*", r"'paper\n'"),
     case("import string", "rig", ["plant"], "sim_twin.plant", "plant", "text like", "'sim_twin.plant'"),
@@ -131,7 +134,7 @@ SCENARIOS = [
     case("weak lid", "scenario", ["boxes", 0, "lid", "force_n"], 0.01, "boxes[0].lid.force_n", "a number from 0.5 up to 5", "0.01"),
     case("slippery", "scenario", ["cylinders", 0, "friction"], 1e-9, "cylinders[0].friction", "a number from 0.05 up to 3", "1e-09"),
     case("heavy", "scenario", ["cylinders", 0, "mass_kg"], 50, "cylinders[0].mass_kg", "a number from 0.01 up to 3", "50"),
-    case("unreachable goal", "scenario", ["reflexes"], {"open_over_receptacle": False}, "schedule[0].rules", "every goal can be reached", "paper_before, under which blue_in_square_box cannot"),
+    case("unreachable goal", "scenario", ["reflexes"], {"open_over_receptacle": False}, "schedule[0].rules", "every goal can be reached", "paper_before, under which blue_in_square_box cannot: what opens the lids in the way never holds, or it takes a reflex that is off (open_over_receptacle)"),
 ]  # fmt: skip
 
 RULES = [
@@ -187,6 +190,8 @@ def test_rules_that_do_not_fit_their_scenario_are_told_in_the_rules_file(tmp_pat
     [
         (["buttons", 0, "name"], "elbow", "buttons[0].name", "a name that no joint of the arm has", "elbow"),
         (["start"], {"position_m": [0.2, 0, 0.2]}, "start.position_m[0]", "within the arm's workspace", "0.2 ± 0.06"),
+        (["start"], {"position_m": [0.3, 0, 0.06]}, "start.position_m[2]", "more than 0.07, so that the fingertips begin above orange_button", "0.06"),
+        (["start"], {"position_m": [0.38, 0, 0.18], "spread_m": [0.01, 0.01, 0.001]}, "start.position_m[2]", "more than 0.1835, so that the fingertips begin above square_box", "0.18"),
         (["buttons", 0, "position_m"], [0.26, -0.21], "buttons[0].position_m[0]", "within the arm's workspace", "0.26 ± 0.03"),
         (["boxes", 0, "position_m"], [0.54, -0.36], "cylinders[0].position_m[1]", "within the arm's workspace", "-0.36 ± 0.05"),
         (["cylinders", 0, "diameter_m"], 0.08, "cylinders[0].diameter_m", "what the open jaws take", "0.08"),

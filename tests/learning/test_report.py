@@ -11,7 +11,7 @@ from rich.console import Console
 from learning.bench import learning_results
 from learning.errors import RunFolderError
 from learning.figures import curriculum_figure, performance_figure, save, styles
-from learning.report import Report, count, group_runs, load_run, report_of
+from learning.report import Report, count, group_runs, load_run, load_runs, report_of
 from learning.telling import report_table, summary_lines
 from tests.support.toy_folder import make_started_toy_folder, make_toy_folder, toy_manifest
 
@@ -72,6 +72,14 @@ def test_optima_that_are_not_of_the_runs_rules_and_goals_are_refused_in_words(tm
     manifest.write_text(json.dumps(tree))
     with pytest.raises(RunFolderError, match=rf"run\.json: {told}$"):
         load_run(folder)
+
+
+def test_a_run_that_is_named_twice_counts_once(tmp_path):
+    folder = make_started_toy_folder(tmp_path / "a").path
+    loaded = load_runs([tmp_path, folder])
+    assert [run.folder for run in loaded.runs] == [str(folder)]
+    assert loaded.left_out == ()
+    assert loaded.lines() == [f"passed over: {folder}: named before, counted once"]
 
 
 def with_manifest(run, **changes):
