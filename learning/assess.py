@@ -4,6 +4,7 @@ from collections.abc import Callable
 
 from config.loader import with_rig
 from learning.assembly import RobotLearner
+from learning.checkpoint import taking_up
 from learning.errors import LearningError
 from learning.evaluation import GoalTest, evaluation_row, learnt_graph, run_test
 from learning.explain import Explanation, explain_graph
@@ -21,7 +22,7 @@ def beliefs_of(folder: RunFolder) -> tuple[Explanation, ...]:
 
     Raises:
         RunFolderError: this is no run folder.
-        CheckpointError: no checkpoint can be read.
+        CheckpointError: no checkpoint can be read, or the newest is another version's.
         LearningError: the run's sub-goal selector holds no graph.
     """
     manifest, config = folder.manifest(), folder.config().learning.subgoal_selection
@@ -29,7 +30,8 @@ def beliefs_of(folder: RunFolder) -> tuple[Explanation, ...]:
         raise LearningError(f"{folder.path}: expected a run whose sub-goal selector is graph, it is {config.kind}")
     state, _ = folder.checkpoints.newest()
     graph = Graph(n_goals=len(manifest.goals), config=config)
-    graph.load_state_dict(state["agent"]["subgoal_selector"]["graph"])
+    with taking_up():
+        graph.load_state_dict(state["agent"]["subgoal_selector"]["graph"])
     return explain_graph(graph)
 
 
@@ -55,7 +57,7 @@ def assess(
     Raises:
         ConfigError: the rig's file is missing or wrong, or it is another arm's.
         RunFolderError: this is no run folder.
-        CheckpointError: no checkpoint can be read.
+        CheckpointError: no checkpoint can be read, or the newest is another version's.
     """
     manifest, resolved = folder.manifest(), folder.config()
     if rig is not None:
@@ -76,7 +78,8 @@ def assess(
     ]
     learner = RobotLearner(resolved, seed=manifest.seed, pictures=folder.path / "resets")
     try:
-        learner.agent.load_state_dict(state["agent"])
+        with taking_up():
+            learner.agent.load_state_dict(state["agent"])
         scores = []
         for test in tests:
             heard = _Count(f"{manifest.goals[test.goal].name}, goal {test.goal + 1} of {n_goals}", tell)

@@ -14,6 +14,8 @@ import re
 import struct
 import zipfile
 import zlib
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +23,7 @@ import numpy as np
 
 from learning.errors import CheckpointError
 
-__all__ = ["CheckpointStore", "decode", "encode", "write_atomically"]
+__all__ = ["CheckpointStore", "decode", "encode", "taking_up", "write_atomically"]
 
 State = dict[str, Any]
 _EPOCH_OF_ZIP = (1980, 1, 1, 0, 0, 0)
@@ -146,6 +148,22 @@ def write_atomically(path: Path, raw: bytes) -> None:
         os.fsync(folder)
     finally:
         os.close(folder)
+
+
+@contextmanager
+def taking_up() -> Iterator[None]:
+    """Guard the reading of a state: one that another version kept may lack what this one looks for.
+
+    Raises:
+        CheckpointError: the state in hand is not of this version's layout.
+    """
+    try:
+        yield
+    except (LookupError, TypeError, ValueError, AttributeError) as error:
+        raise CheckpointError(
+            f"expected a checkpoint as this version keeps it, came another ({type(error).__name__}: {error}); use the "
+            "version that began the run (run.json names it), or begin a run of its own in another folder by --out"
+        ) from error
 
 
 class CheckpointStore:

@@ -12,7 +12,7 @@ import msgspec
 
 from config.learning import Experiment as ExperimentConfig
 from learning.agent import Agent, EpochRecord
-from learning.checkpoint import CheckpointStore, encode
+from learning.checkpoint import CheckpointStore, encode, taking_up
 from learning.errors import TooManyVoidEpochsError
 from learning.evaluation import GoalTest, learnt_graph
 from learning.evaluation_pool import EvaluationPool
@@ -101,10 +101,15 @@ class Experiment:
         self._n_void_running = 0
 
     def restore(self, state: dict[str, Any]) -> None:
-        """Take up the run where a checkpoint left it; the tables must have been cut back to its row counts."""
-        self._agent.load_state_dict(state["agent"])
-        self._n_done = self._n_done_before = state["n_done"]
-        self._n_void_running = state["n_void_running"]
+        """Take up the run where a checkpoint left it; the tables must have been cut back to its row counts.
+
+        Raises:
+            CheckpointError: the checkpoint is another version's.
+        """
+        with taking_up():
+            self._agent.load_state_dict(state["agent"])
+            self._n_done = self._n_done_before = state["n_done"]
+            self._n_void_running = state["n_void_running"]
 
     def run(self, should_stop: Callable[[], bool] = lambda: False) -> int:
         """Learn until the plan is carried out or a stop is asked for, and return how many epochs are done.

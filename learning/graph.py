@@ -249,7 +249,7 @@ class Graph:
         }
 
     def load_state_dict(self, state: dict[str, Any]) -> None:
-        """Restore bit for bit; of a state that was kept before doubts were told from changes, as far as it goes."""
+        """Restore bit for bit."""
         for belief, loaded in zip(self.beliefs, state["beliefs"], strict=True):
             belief.load_state_dict(loaded)
         self._skill = list(state["skill"])
@@ -257,10 +257,7 @@ class Graph:
         self._lost = np.array(state["lost"], dtype=float)
         self._tried = np.array(state["tried"], dtype=float)
         self._reached = np.array(state["reached"], dtype=float)
-        if "revisions" in state:
-            self._revisions.load_state_dict(state["revisions"])
-        else:
-            self._revisions.begin(self.beliefs, state["changed_epoch"])
+        self._revisions.load_state_dict(state["revisions"])
         for kept, loaded in zip(self._log, state["log"], strict=True):
             kept.clear()
             kept.extend(msgspec.convert(loaded, list[Evidence]))

@@ -28,11 +28,7 @@ class Revisions:
     """
 
     def __init__(self, beliefs: Sequence[Belief]) -> None:
-        self.begin(beliefs, [None] * len(beliefs))
-
-    def begin(self, beliefs: Sequence[Belief], epochs: Sequence[int | None]) -> None:
-        """Take what is believed now to have taken hold, each since an epoch; None where it was so from the start."""
-        self._newest = [_Revision(b.most_probable, epoch) for b, epoch in zip(beliefs, epochs, strict=True)]
+        self._newest = [_Revision(belief.most_probable, None) for belief in beliefs]
         self._held = list(self._newest)
 
     def note(self, goal: int, belief: Belief, epoch: int) -> bool:

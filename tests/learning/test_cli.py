@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
+from learning.checkpoint import decode, encode
 from learning.metrics import Summary
 from learning.report import Report
 from learning.rows import EvaluationRow
@@ -155,6 +156,22 @@ def test_evaluate_without_a_checkpoint_fails_in_one_line(run, tmp_path):
     done = autotelic("evaluate", tmp_path)
     assert done.exit_code == 1
     assert lines(done)[-1].startswith("error: no readable checkpoint")
+
+
+@pytest.mark.parametrize("command", [("explain",), ("evaluate",), ("learn", "--resume", "--out")])
+def test_a_checkpoint_of_another_version_fails_in_one_line(run, tmp_path, command):
+    old = tmp_path / "old"
+    shutil.copytree(run[0], old)
+    newest = max((old / "checkpoints").iterdir())
+    state = decode(newest.read_bytes())
+    del state["agent"]["subgoal_selector"]["graph"]["revisions"]
+    for path in (old / "checkpoints").iterdir():
+        path.write_bytes(encode(state))
+    done = autotelic(*command, old)
+    assert done.exit_code == 1
+    assert "Traceback" not in done.output
+    assert "expected a checkpoint as this version keeps it" in lines(done)[-1]
+    assert "'revisions'" in lines(done)[-1]
 
 
 def test_explain_tells_every_goals_needs_and_plan(run):

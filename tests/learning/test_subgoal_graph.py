@@ -346,13 +346,6 @@ def test_what_was_doubted_is_kept_through_a_checkpoint():
     assert encode(again.state_dict()) == encode(g.state_dict())
 
 
-def test_a_checkpoint_from_before_doubts_were_told_from_changes_can_be_read():
-    state, again = doubted().state_dict(), Graph(n_goals=2, config=SubgoalSelection())
-    del state["revisions"]
-    again.load_state_dict(state | {"changed_epoch": [None, 20]})
-    assert (again.changed_epoch(0), again.changed_epoch(1)) == (None, 20)
-
-
 def test_a_graph_of_one_goal_works():
     selector = GraphSelector(n_goals=1, config=SubgoalSelection(curiosity=1.0), rng=np.random.default_rng(0))
     for explore in (True, False):
