@@ -99,8 +99,8 @@ class UtilityModel:
     def _assurance(self) -> float:
         """Successes, of less weight the more of the newest trials did not succeed by the model alone.
 
-        They make the steps of Adam small. A model that misses wherever it seldom began is not fitted, however much it
-        has seen; nor is one whose inputs were weighed anew.
+        They make the steps of Adam small. One that misses from places it seldom began at has yet to learn them, however
+        much it has seen; so has one whose inputs were just weighed anew.
         """
         return self.n_successes * (sum(self._clean) / max(1, len(self._clean))) ** 2
 

@@ -146,7 +146,7 @@ def moved_by_training(model: UtilityModel) -> float:
     return sum(float(np.abs(a - b).sum()) for a, b in zip(before, weights_of(model), strict=True))
 
 
-def test_a_model_of_many_successes_learns_as_fast_as_a_new_one_while_it_fails():
+def test_a_model_of_many_successes_takes_larger_steps_while_it_fails():
     model = taught(make(), n=200)
     for k in range(20):
         model.count(is_success=k % 7 > 0)
