@@ -83,6 +83,8 @@ class ServoClient:
         """It crossed a time step on the way, which will be refused."""
         self._why_lost: str | None = None
         self._newest: ArmState | None = None
+        self._epoch = 0
+        """Whose rules are in force, in a process that takes over from one that has ended too."""
         self._encode = msgspec.msgpack.Encoder().encode
         self._decode = msgspec.msgpack.Decoder(Reply).decode
         self.identity: PlantIdentity | None = None
@@ -130,6 +132,7 @@ class ServoClient:
         self._watch = ServoWatch(process.pid, pulse)
         try:
             self.identity = self._ask(Connect(), Connected, START_S).identity
+            self._ask(BeginEpoch(epoch=self._epoch), Outputs, ANSWER_S)
         except RobotError:
             self._kill()
             raise
@@ -164,6 +167,7 @@ class ServoClient:
     def begin_epoch(self, epoch: int) -> int:
         """Take up the rules of an epoch and return the outputs it begins with."""
         self.connect()
+        self._epoch = epoch
         return self._ask(BeginEpoch(epoch=epoch), Outputs, ANSWER_S).bits
 
     def seed(self) -> ArmState:

@@ -12,7 +12,6 @@ its time. Ctrl-C at the terminal is the station's to decide on: this process is 
 not vanish from under an epoch that is to be finished.
 """
 
-import gc
 import os
 import signal
 import sys
@@ -26,6 +25,7 @@ from config.resolved import Resolved
 from robot.errors import RobotError, SafetyError, WireError
 from robot.hal.protocols import Linked, Plant
 from robot.messages import ArmState, GripCommand, Verdict
+from robot.realtime import Seat, collect_rarely
 from robot.rigs import build_plant
 from robot.safety import Reason
 from robot.servo_messages import (
@@ -82,6 +82,9 @@ def serve(connection: Connection, resolved_json: bytes, pulse: MutableSequence[i
     os.setpgrp()
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(EXIT_TERMINATED))
     resolved = msgspec.json.decode(resolved_json, type=Resolved)
+    seat = Seat(resolved.rig.realtime_priority)
+    if seat.why_not is not None:
+        print(f"servo process: {seat.why_not}", file=sys.stderr, flush=True)  # noqa: T201 - for a person
     plant = build_plant(rig=resolved.rig, arm=resolved.arm, scenario=resolved.scenario, cell=resolved.cell)
     server: ServoServer
 
@@ -111,10 +114,9 @@ def serve(connection: Connection, resolved_json: bytes, pulse: MutableSequence[i
         arm=resolved.arm,
         pulse=pulse,
         die=die,
+        seat=seat,
     )
-    # What is there by now stays: no collection in the midst of the ticks need look through it again.
-    gc.collect()
-    gc.freeze()
+    collect_rarely()
     code = 0
     try:
         server.run()
@@ -142,6 +144,7 @@ class ServoServer:
         arm: the arm's file.
         pulse: shared memory of one number: ticks so far while it ticks, otherwise 0.
         die: ends the process on the spot.
+        seat: where this thread ticks.
     """
 
     def __init__(
@@ -153,7 +156,9 @@ class ServoServer:
         arm: ArmConfig,
         pulse: MutableSequence[int],
         die: Callable[[], object],
+        seat: Seat,
     ) -> None:
+        self._seat = seat
         self._connection, self._plant, self._loop, self._tool = connection, plant, loop, arm.tool
         self._intent_max_age_ns = round(arm.motion.intent_max_age_s * 1e9)
         self._begin_ticks = round(BEGIN_S * plant.arm.spec.rate_hz)
@@ -246,9 +251,11 @@ class ServoServer:
     def _obey(self, request: Request) -> Reply:
         match request:
             case Connect():
+                self._seat.leave()
                 self._loop.connect()
                 return Connected(identity=self._plant.identity)
             case Engage():
+                self._seat.leave()
                 self._loop.engage()
             case Seed():
                 return Seeded(state=self._seed())
@@ -271,6 +278,7 @@ class ServoServer:
             opening_m=opening_m, force_n=self._tool.grip_force_n, speed_m_s=self._tool.speed_m_s[0]
         )
         self._rest()
+        self._seat.take()
         self._is_in_command = True
         return state
 

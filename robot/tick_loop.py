@@ -77,7 +77,7 @@ class TickLoop:
         self._gate = Gate(arm=arm, limits=limits, chain=ToolChain(config), when_latched=when_latched)
         self._tick_s, self._tick_ns = rig.tick_s, round(rig.tick_s * 1e9)
         self.state: ArmState
-        self._read_ns = 0
+        self._read_ns = self._epoch = 0
         self._before: ArmState
 
     @property
@@ -114,10 +114,16 @@ class TickLoop:
 
     def begin_epoch(self, epoch: int) -> int:
         """Take up the rules of an epoch, latched inputs cleared, and return the outputs it begins with."""
+        self._epoch = epoch
         return self._cell.begin_epoch(epoch)
 
     def seed(self) -> ArmState:
-        """Start everything from the measured state, and return it."""
+        """Start everything from the measured state, and return it.
+
+        What was pressed since the epoch was begun counts no more: until a reset has moved the arm, ticks that hold it
+        go on where it stood, on a button perhaps.
+        """
+        self._cell.begin_epoch(self._epoch)
         state = self._before = self._read_now()
         self._gate.seed(state)
         self._mover.seed(state)

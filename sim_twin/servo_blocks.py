@@ -13,6 +13,7 @@ from robot.errors import RobotError
 from robot.hal.protocols import Clock
 from robot.hal.rtde import RtdeArm
 from robot.messages import GripCommand, Heading
+from robot.realtime import Seat
 from robot.tick_loop import TickLoop
 from sim_twin.tally import Tally
 
@@ -22,6 +23,7 @@ PERIOD_S = 0.002
 LATE_S = 1.5 * PERIOD_S
 INTENT_TICKS, TURN_RAD, STEP_M, HEIGHT_M = 25, 0.3, 0.01, 0.2
 """A new intent every 50 ms, each turned from the one before: the tool goes round a circle of 7 cm."""
+SECOND_US = 1000
 SWING_RAD, SWING_S = 0.02, 2.0
 N_TRIES, PAUSE_S = 5, 0.2
 
@@ -38,7 +40,7 @@ class _Listener:
 
     def __init__(self, clock: Clock, tell: Callable[[float, float, float, bool], None]) -> None:
         self._clock, self._tell = clock, tell
-        self._woke_s = self._woke_cpu_s = 0.0
+        self._woke_s = self._told_s = self._told_cpu_s = 0.0
         self._n_preempted = 0
         self.is_on = False
 
@@ -49,7 +51,8 @@ class _Listener:
     def begin(self) -> None:
         """A block begins."""
         self._n_preempted = _n_preempted()
-        self.is_on, self._woke_s, self._woke_cpu_s = True, perf_counter(), thread_time()
+        self.is_on, self._woke_s = True, perf_counter()
+        self._told_s, self._told_cpu_s = self._woke_s, thread_time()
 
     def wait_tick(self) -> int:
         """Wait as the arm's clock does."""
@@ -57,10 +60,10 @@ class _Listener:
         is_preempted = _n_preempted() > self._n_preempted
         n_missed = self._clock.wait_tick()
         if self.is_on:
-            woke_s, woke_cpu_s = perf_counter(), thread_time()
-            self._tell(woke_s - self._woke_s, asleep_s - self._woke_s, asleep_cpu_s - self._woke_cpu_s, is_preempted)
-            self._n_preempted = _n_preempted()
-            self._woke_s, self._woke_cpu_s = woke_s, woke_cpu_s
+            woke_s = perf_counter()
+            self._tell(woke_s - self._woke_s, asleep_s - self._told_s, asleep_cpu_s - self._told_cpu_s, is_preempted)
+            self._n_preempted, self._woke_s = _n_preempted(), woke_s
+            self._told_s, self._told_cpu_s = perf_counter(), thread_time()  # telling is no part of a tick's work
         return n_missed
 
 
@@ -82,10 +85,12 @@ class Blocks:
         own_cpu: The same by the processor's time of this thread.
         calm_work: As own_work, of the ticks from which the kernel did not take the processor.
         intent_cpu: As own_cpu, of the ticks in which an intent begins.
+        own_work_p99_s: The 99th percentile of own_work, of every second.
         bare_period: From tick to tick with the client alone.
         bare_call: What the client's servoJ took there.
         n_stops: Blocks of ours that ended before their time, by a refusal of the gate or a loss of the arm.
         servo_s: How long our loop was in command.
+        seat: Where this thread ticks, with either client.
     """
 
     def __init__(self, *, address: str, resolved: Resolved) -> None:
@@ -97,20 +102,24 @@ class Blocks:
         """
         self.period, self.own_work, self.own_cpu = Tally(over_s=LATE_S), Tally(), Tally()
         self.calm_work, self.intent_cpu = Tally(), Tally()
-        self._is_beginning = False
+        self.own_work_p99_s: list[float] = []
+        self._second, self._is_beginning = Tally(limit_us=SECOND_US), False
         self.bare_period, self.bare_call = Tally(over_s=LATE_S), Tally()
         self.n_stops, self.servo_s = 0, 0.0
         self._address, self._resolved = address, resolved
         self._servo, self._tool = resolved.arm.servo, resolved.arm.tool
+        self.seat = Seat(resolved.rig.realtime_priority)
         self._call_s = 0.0
         self._begin_anew()
 
     def run_bare(self, duration_s: float) -> None:
         """Swing the base with the client's calls alone; a receive interface is open as it is in our blocks."""
+        self.seat.leave()
         self._arm.connect()
         control = _control_of(self._arm.address)
         q, servo, calls = list(self._arm.read().q_rad), self._servo, Tally()
         middle_rad = q[0]
+        self.seat.take()
         begun_s = woke_s = perf_counter()
         while woke_s - begun_s < duration_s:
             start = control.initPeriod()
@@ -130,10 +139,12 @@ class Blocks:
 
     def run_ours(self, duration_s: float) -> None:
         """Lead the tool round a circle through motion, cell, gate and backend, as a servo process does."""
+        self.seat.leave()
         try:
             self._loop.connect()
             self._loop.begin_epoch(0)
             self._loop.engage()
+            self.seat.take()
             is_whole = self._go_round(duration_s)
         except RobotError:
             is_whole = False
@@ -178,6 +189,10 @@ class Blocks:
         self.period.add(period_s)
         self.own_work.add(spent_s - self._call_s)
         self.own_cpu.add(cpu_s - self._call_s)
+        self._second.add(spent_s - self._call_s)
+        if self._second.n * PERIOD_S >= 1.0:
+            self.own_work_p99_s.append(self._second.percentile_s(99.0))
+            self._second = Tally(limit_us=SECOND_US)
         if not is_preempted:
             self.calm_work.add(spent_s - self._call_s)
         if self._is_beginning:

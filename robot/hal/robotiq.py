@@ -26,6 +26,8 @@ RESET, READY = 0, 3
 """STA: 0 reset, 1 activating, 3 active."""
 ASK_EVERY = 8
 """Polls from question to question: at 500 of them a second a hand is seen every 16 ms."""
+CHUNK = 256
+"""Longer than an answer; so short that no page is asked of the operating system for it."""
 NO_VALUE = "?"
 """What the port answers for a gripper that it does not hear: without power, mostly."""
 DEAF_LIMIT = 25
@@ -81,6 +83,8 @@ class RobotiqGripper:
         self._scale = scale
         self._socket: socket.socket | None = None
         self._received = b""
+        self._answer: bytes | None = None
+        """The last answer to all questions that came in one piece."""
         self._outgoing = b""
         self._said: dict[str, int] = {}
         self._grip: GripCommand | None = None
@@ -98,6 +102,7 @@ class RobotiqGripper:
             WireError: nobody listens there.
         """
         self._received = self._outgoing = b""
+        self._answer = None
         self._said.clear()
         self._n_deaf, self._is_watched, self._is_activating = 0, False, False
         self._grip = self._asked = self.state = None
@@ -219,16 +224,22 @@ class RobotiqGripper:
 
     def _receive(self) -> None:
         try:
-            chunk = self._open().recv(4096)
+            chunk = self._open().recv(CHUNK)
         except BlockingIOError:
             return
         except OSError as error:
             raise WireError(f"gripper: expected an answer, got {error}") from error
         if not chunk:
             raise WireError("gripper: expected an answer, the connection was closed by the other side")
+        if chunk == self._answer and not self._received:
+            self._note_answer()  # the same as before, word by word
+            return
+        is_whole, n_answers, self._answer = not self._received, self.n_answers, None
         *lines, self._received = (self._received + chunk).split(b"\n")
         for line in lines:
             self._take_in(line.decode("ascii", "replace"))
+        if is_whole and not self._received and self.n_answers == n_answers + 1:
+            self._answer = chunk
 
     def _take_in(self, line: str) -> None:
         while line.startswith(ACKNOWLEDGED):  # sent without an end of line, before the next answer
@@ -240,10 +251,13 @@ class RobotiqGripper:
             return
         self._said[words[0]] = int(words[1])
         if words[0] == "ACT":  # the last of the five questions
-            self._is_query_out, self._n_deaf = False, 0
-            self.n_answers += 1
-            self._judge()
+            self._note_answer()
             self._tell()
+
+    def _note_answer(self) -> None:
+        self._is_query_out, self._n_deaf = False, 0
+        self.n_answers += 1
+        self._judge()
 
     def _note_deaf(self, name: str) -> None:
         self._said.pop(name, None)

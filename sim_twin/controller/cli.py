@@ -38,7 +38,8 @@ def controller(
     if context.invoked_subcommand is not None:
         return
     from config.errors import ConfigError
-    from sim_twin.controller.server import ControllerServer, Setup
+    from robot.realtime import take_priority
+    from sim_twin.controller.server import PRIORITY, ControllerServer, Setup
 
     try:
         text = "" if script is None else script.read_text(encoding="utf-8")
@@ -56,6 +57,7 @@ def controller(
         )
         server = ControllerServer(setup)
         with server:
+            take_priority(PRIORITY)
             server.run(when_ready=lambda: typer.echo(f"virtual UR5e {version} ready on {host}"))
     except (OSError, ValueError, ConfigError) as error:
         typer.echo(f"error: {' '.join(str(error).split())}", err=True)

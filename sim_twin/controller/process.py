@@ -11,8 +11,9 @@ from typing import Self
 import msgspec
 
 from config.errors import ConfigError
+from robot.realtime import take_priority
 from sim_twin.controller.control_port import CONTROL
-from sim_twin.controller.server import ControllerServer, Setup
+from sim_twin.controller.server import PRIORITY, ControllerServer, Setup
 
 __all__ = ["ControllerProcess", "ControllerProcessError", "ask_fault"]
 
@@ -133,6 +134,7 @@ def _serve(setup: bytes, line: Connection) -> None:
     try:
         server = ControllerServer(msgspec.json.decode(setup, type=Setup))
         with server:
+            take_priority(PRIORITY)
             server.run(when_ready=lambda: line.send_bytes(_READY), is_over=line.poll)
     except (OSError, ValueError, ConfigError) as error:
         line.send_bytes(str(error).encode())

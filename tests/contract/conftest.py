@@ -1,4 +1,4 @@
-"""What the contract suites share: rigs, which cases are worth their wall time, a repeat on a stalled machine."""
+"""What the contract suites share: rigs, and a repeat on a stalled machine."""
 
 import os
 from contextlib import suppress
@@ -25,20 +25,6 @@ def world(request):
 @pytest.fixture
 def resolved(world):
     return world.resolved
-
-
-@pytest.hookimpl(tryfirst=True)
-def pytest_collection_modifyitems(items):
-    """Mark slow what `wall_sample` leaves out, on the rigs whose time is the wall's."""
-    n_by_test = {}
-    for item in items:
-        marker = item.get_closest_marker("wall_sample")
-        if marker is None or WORLDS[item.callspec.params["world"]].is_lock_step:
-            continue
-        test = item.originalname, item.path
-        n_by_test[test] = n_by_test.get(test, 0) + 1
-        if n_by_test[test] > marker.args[0]:
-            item.add_marker(pytest.mark.slow)
 
 
 STALL_S, N_ATTEMPTS = 0.03, 3

@@ -331,7 +331,6 @@ def test_a_reset_is_reproducible_by_its_seed_whatever_happened_before(world, pla
     assert is_same(world, snapshot(other), first)
 
 
-@pytest.mark.wall_sample(1)
 @pytest.mark.parametrize("seed", range(5))
 def test_after_a_reset_the_arm_rests_in_the_start_region_with_an_open_hand(plant, driver, resolved, seed):
     driver.opening = 0.0

@@ -50,7 +50,7 @@ def go(angle=0.0, distance=0.022, height=0.2, **more):
     return Heading(heading_rad=angle, distance_m=distance, height_m=height, **more)
 
 
-def episode(station, *, seed, epoch, n=60):
+def episode(station, *, seed, epoch, n):
     """Run random intents from a reset and return every percept, and what the gate said."""
     rng = np.random.default_rng([seed, epoch, 7])
     percepts, verdicts = [station.reset(seed=seed, epoch=epoch)], []
@@ -233,22 +233,20 @@ def test_the_same_seed_is_the_same_episode_and_another_seed_another(world, two):
     assert is_same(world, episode(other, seed=3, epoch=0, n=8), first)
 
 
-@pytest.mark.wall_sample(0)
 def test_an_epoch_depends_on_nothing_before_its_reset(world, two):
     (through, _), (straight, _) = two
     for epoch in (0, 1):
-        episode(through, seed=3, epoch=epoch)
-    first = episode(through, seed=3, epoch=2)
-    assert is_same(world, episode(straight, seed=3, epoch=2), first)
+        episode(through, seed=3, epoch=epoch, n=world.n_steps)
+    first = episode(through, seed=3, epoch=2, n=world.n_steps)
+    assert is_same(world, episode(straight, seed=3, epoch=2, n=world.n_steps), first)
 
 
-@pytest.mark.wall_sample(0)
 def test_an_epoch_after_a_latch_is_the_epoch_that_would_have_been(world, two):
     station, operator = two[0]
-    expected = episode(station, seed=3, epoch=2)
+    expected = episode(station, seed=3, epoch=2, n=world.n_steps)
     station.step(go(angle=math.nan))
     operator.rearm(station, seed=9, epoch=0)
-    assert is_same(world, episode(station, seed=3, epoch=2), expected)
+    assert is_same(world, episode(station, seed=3, epoch=2, n=world.n_steps), expected)
 
 
 # -------------------------------------------------------------------------------------------------------- refusing
@@ -272,7 +270,6 @@ HOSTILE = [
 ]
 
 
-@pytest.mark.wall_sample(3)
 @pytest.mark.parametrize(("intent", "reason"), HOSTILE)
 def test_a_hostile_intent_is_refused_with_a_clear_verdict_and_moves_nothing(standing, intent, reason):
     station, arm, _ = standing
@@ -292,7 +289,6 @@ def test_a_hostile_intent_is_refused_with_a_clear_verdict_and_moves_nothing(stan
     assert arm.read().q_rad == pytest.approx(before.q_rad, abs=2e-3)
 
 
-@pytest.mark.wall_sample(1)
 @pytest.mark.parametrize(
     "intent",
     [
@@ -342,7 +338,6 @@ def test_after_a_latch_motion_starts_from_rest_at_the_measured_joints(engaged):
     assert math.dist(result.percept.tcp_position_m, start) < 1e-3
 
 
-@pytest.mark.wall_sample(0)
 def test_too_many_latches_fail_the_run(world, resolved):
     few = msgspec.structs.replace(resolved, rig=msgspec.structs.replace(resolved.rig, max_latches=2))
     station, _, operator = world.station(few)

@@ -1,5 +1,6 @@
 """The gripper's client against a server that speaks its protocol on a real socket, driven by hand."""
 
+import msgspec
 import pytest
 
 from config.loader import load_arm
@@ -162,6 +163,18 @@ def test_a_commanded_gripper_that_obeys_no_more_says_so(bench, sta, flt, said):
     bench.fingers.measured = GripperMeasurement(pos=3, pre=3, sta=sta, obj=3, flt=flt)
     with pytest.raises(WireError, match=said):
         bench.turn(lambda: False)
+
+
+def test_a_fault_that_comes_and_goes_is_seen_each_time_it_is_there(bench):
+    bench.turn(until=lambda: bench.gripper.n_answers >= 3)  # the same answer again and again
+    bench.gripper.command(GripCommand(opening_m=0.04, force_n=20.0, speed_m_s=0.05))
+    for _ in range(2):
+        bench.fingers.measured = msgspec.structs.replace(bench.fingers.measured, flt=5)
+        with pytest.raises(WireError, match="fault 5"):
+            bench.turn(until=lambda: False)
+        assert not bench.gripper.is_active
+        bench.fingers.measured = msgspec.structs.replace(bench.fingers.measured, flt=0)
+        bench.turn(until=lambda: bench.gripper.is_active)
 
 
 def test_one_that_nobody_commands_may_be_in_any_state(bench):

@@ -80,6 +80,14 @@ def test_a_process_that_was_killed_is_said_and_a_new_one_starts_without_command(
         stride(client, go())
 
 
+def test_a_process_that_takes_over_has_the_rules_of_the_epoch(client):
+    assert client.begin_epoch(0) != (changed := client.begin_epoch(1000))  # the paper's rules change there
+    os.kill(client.pid, signal.SIGKILL)
+    client.engage()
+    client.seed()
+    assert stride(client, go()).after.digital_out == changed
+
+
 def test_what_holds_no_arm_any_more_is_stopped_without_complaint(client):
     client.engage()
     client.seed()

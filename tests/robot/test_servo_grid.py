@@ -98,7 +98,7 @@ def test_after_a_rest_the_next_time_step_is_a_whole_one():
 
 def test_what_latches_while_a_time_step_waits_to_begin_is_told_and_the_step_refused():
     server = served()
-    server._plant.arm.mode = ArmMode.PROTECTIVE_STOP
+    server.plant.arm.mode = ArmMode.PROTECTIVE_STOP
     at_rad = server.wait(1).q_rad
     server.begin(AHEAD, n_ticks=N_TICKS)
     told, refused = server.replies()
@@ -106,3 +106,18 @@ def test_what_latches_while_a_time_step_waits_to_begin_is_told_and_the_step_refu
     assert (told.stride.verdict.reason, told.is_asked) == ("arm_mode", False)
     assert isinstance(refused, Failure)
     assert server.loop.state.q_rad == at_rad
+
+
+def test_a_button_that_is_held_until_the_reset_is_not_pressed_in_the_next_epoch():
+    server = served()
+    button = fake_rig().scenario.buttons[0]
+    server.plant.arm.digital_in = 1 << button.input
+    lit = server.wait(2).digital_out
+    assert lit & 1 << button.lamp_output
+    dark = server.begin_epoch(1)
+    assert not dark & 1 << button.lamp_output
+    server.wait(2)  # the finger is on it still
+    server.plant.arm.digital_in = 0
+    server.plant.resetter.reset(seed=1, epoch=1, digital_out=dark)
+    server.seed()
+    assert server.wait(2).digital_out == dark

@@ -9,6 +9,7 @@ import pytest
 from robot.errors import ArmRefusedError, StaleStateError, WireError
 from robot.hal.fake import FakePlant
 from robot.messages import ArmMode, GripCommand, Heading
+from robot.realtime import Seat
 from robot.servo_client import ServoClient
 from robot.servo_messages import (
     Close,
@@ -49,7 +50,13 @@ class Served:
             when_latched=lambda verdict: self.server.latched(verdict),
         )  # fmt: skip
         self.server = ServoServer(
-            connection=theirs, plant=self.plant, loop=loop, arm=rig.arm, pulse=self.pulse, die=self.die
+            connection=theirs,
+            plant=self.plant,
+            loop=loop,
+            arm=rig.arm,
+            pulse=self.pulse,
+            die=self.die,
+            seat=Seat(0),
         )
         self.thread = Thread(target=self.run)
         self.thread.start()

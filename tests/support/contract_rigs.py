@@ -26,10 +26,12 @@ class LockStepWorld:
         is_lock_step: Time passes in wait_tick alone, so that no tick is missed, reading costs no time, and the same
             seed and commands give the same measurements bit for bit. Elsewhere time is the wall's, and the same holds
             within what some milliseconds of it make.
+        n_steps: How long an episode is compared with another: where time is the wall's, as long as it takes to move on
+            from the start, turn, sink and rise.
         recording: What a module recorded once, None before.
     """
 
-    is_lock_step = True
+    is_lock_step, n_steps = True, 60
 
     def __init__(self, resolved):
         self.resolved, self.recording = resolved, None
@@ -108,7 +110,7 @@ class WireWorld:
     client, which the station knows nothing of.
     """
 
-    is_lock_step = False
+    is_lock_step, n_steps = False, 16
 
     def __init__(self, resolved):
         from sim_twin.controller.process import ControllerProcess

@@ -7,7 +7,18 @@ import msgspec
 from config.resolved import Resolved
 from robot.hal.protocols import Plant
 from robot.messages import ArmState, GripCommand, Intent
-from robot.servo_messages import Connect, Engage, Reply, Request, Seed, StrideRequest, pack_intent
+from robot.realtime import Seat
+from robot.servo_messages import (
+    BeginEpoch,
+    Connect,
+    Engage,
+    Outputs,
+    Reply,
+    Request,
+    Seed,
+    StrideRequest,
+    pack_intent,
+)
 from robot.servo_process import ServoServer
 from robot.tick_loop import Stride, TickLoop
 
@@ -27,7 +38,7 @@ class HandServed:
     """
 
     def __init__(self, resolved: Resolved, plant: Plant) -> None:
-        self._plant = plant
+        self.plant = plant
         self._ours, theirs = Pipe()
         tool = resolved.arm.tool
         self._grip = GripCommand(opening_m=tool.stroke_m, force_n=tool.grip_force_n, speed_m_s=tool.speed_m_s[1])
@@ -36,14 +47,22 @@ class HandServed:
             rig=resolved.rig, when_latched=lambda verdict: self.server.latched(verdict),
         )  # fmt: skip
         self.server = ServoServer(
-            connection=theirs, plant=plant, loop=self.loop, arm=resolved.arm, pulse=[0], die=lambda: None
-        )
+            connection=theirs, plant=plant, loop=self.loop, arm=resolved.arm, pulse=[0], die=lambda: None,
+            seat=Seat(0),
+        )  # fmt: skip
         self._ask(Connect())
         self._ask(Engage())
 
     def seed(self) -> None:
         """Start from the measured state."""
         self._ask(Seed())
+
+    def begin_epoch(self, epoch: int) -> int:
+        """Take up an epoch's rules; return the outputs it begins with."""
+        self.server._answer(BeginEpoch(epoch=epoch))
+        (reply,) = self.replies()
+        assert isinstance(reply, Outputs)
+        return reply.bits
 
     def wait(self, n_ticks: int) -> ArmState:
         """Let so many ticks pass without a word from the station; return the newest state."""
