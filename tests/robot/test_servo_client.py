@@ -82,7 +82,10 @@ def test_a_process_that_was_killed_is_said_and_a_new_one_starts_without_command(
 
 def test_a_process_that_takes_over_has_the_rules_of_the_epoch(client):
     assert client.begin_epoch(0) != (changed := client.begin_epoch(1000))  # the paper's rules change there
+    client.engage()
+    client.seed()
     os.kill(client.pid, signal.SIGKILL)
+    assert stride(client, go()).verdict.is_latched
     client.engage()
     client.seed()
     assert stride(client, go()).after.digital_out == changed
