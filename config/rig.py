@@ -42,8 +42,8 @@ class Rig(Section, frozen=True, kw_only=True):
     expected: PlantExpected
     tick_s: Annotated[float, Meta(ge=0.002, le=0.05)] = 0.01
     physics_s: Annotated[float, Meta(ge=0.0005, le=0.01)] = 0.002
-    realtime_priority: Annotated[int, Meta(ge=0, le=90)] = 40
-    """SCHED_FIFO priority that a servo process of its own asks for; 0 leaves it to the machine's sharing of time."""
+    realtime_priority: Annotated[int, Meta(ge=0, le=90)] = 0
+    """SCHED_FIFO priority that a servo process of its own asks for; 0 takes its share of time as all do."""
     max_latches: Annotated[int, Meta(ge=0, le=10_000)] = 20
     """More latches than this within latch_window resets and a run fails: something is wrong that no reset mends."""
     latch_window: Annotated[int, Meta(ge=1, le=100_000)] = 200

@@ -90,21 +90,11 @@ def test_the_shipped_configs_are_found_and_right(call):
 
 
 def test_a_few_epochs_of_learning_leave_a_run_folder(call):
-    arguments = (
-        "--scenario",
-        "paper",
-        "--rig",
-        "twin",
-        "--preset",
-        "default",
-        "--seed",
-        "3",
-        "--epochs",
-        "2",
-        "--out",
-        "out",
-    )
-    result = call("learn", *arguments)
+    shipped = (call.site / "config" / "learning" / "default.yaml").read_text(encoding="utf-8")
+    assert "test_epochs: 10" in shipped
+    (call.folder / "quick.yaml").write_text(shipped.replace("test_epochs: 10", "test_epochs: 1"), encoding="utf-8")
+    names = ("--scenario", "paper", "--rig", "twin", "--preset", "quick.yaml")
+    result = call("learn", *names, "--seed", "3", "--epochs", "2", "--out", "out")
     assert result.returncode == 0, result.stdout + result.stderr
     out = call.folder / "out"
     assert load_resolved(out / "config.yaml").scenario.name == "paper"
