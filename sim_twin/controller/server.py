@@ -30,8 +30,8 @@ CONTROL_TICKS = 5
 """The faults' door is looked at this often: a look costs as much as a tenth of the physics."""
 PLAYED, MOST_MINOR = (3, 5), 99
 PRIORITY = 30
-"""What a process that runs nothing else may ask of the kernel: before everything ordinary, and after the tick threads of
-clients on this machine, which a controller of its own would take no time from."""
+"""What a process that runs nothing else may ask of the kernel: before all that is ordinary, and after the tick threads
+of clients on this machine, which a controller of its own would take no time from."""
 SWITCH_S = 0.0002
 """How long the compiler's thread may keep the interpreter from the loop."""
 
