@@ -14,6 +14,8 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from robot.chatter import chatter_to_stderr
+
 __all__ = ["BENCH_GROUP", "Bench", "BenchReport", "BenchResult", "bench", "bench_report"]
 
 BENCH_GROUP = "autotelic.benches"
@@ -94,7 +96,8 @@ def _measure(point: EntryPoint, *, full: bool, run: Path | None, seconds: float 
     if seconds is not None and "seconds" not in known:
         raise typer.BadParameter(f"bench {point.name} has a length of its own", param_hint="--seconds")
     offered = {"run": run, "seconds": seconds}
-    return function(full=full, **{name: value for name, value in offered.items() if name in known})
+    with chatter_to_stderr():
+        return function(full=full, **{name: value for name, value in offered.items() if name in known})
 
 
 def _print_table(report: BenchReport) -> None:

@@ -22,6 +22,7 @@ import msgspec
 
 from config.arm import ArmConfig
 from config.resolved import Resolved
+from robot.chatter import divert_chatter
 from robot.errors import RobotError, SafetyError, WireError
 from robot.hal.protocols import Linked, Plant
 from robot.messages import ArmState, GripCommand, Verdict
@@ -79,6 +80,7 @@ def serve(connection: Connection, resolved_json: bytes, pulse: MutableSequence[i
     SIGTERM stops the arm and ends it too. It does not return: ruckig's binding would tell of some thirty leaks at the
     interpreter's end, over what a person is to read.
     """
+    divert_chatter()  # ur_rtde tells of reconnections, placo of the model that it loads
     os.setpgrp()
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(EXIT_TERMINATED))
     resolved = msgspec.json.decode(resolved_json, type=Resolved)
