@@ -119,8 +119,8 @@ class Panel:
         return lambda: _STARTED[start.has_begun]
 
     def stop(self) -> Outcome:
-        """Stop whatever runs; UR answers alike where nothing does."""
-        self._programs.handle(Event.STOP)
+        """Stop whatever runs or is about to; UR answers alike where nothing does."""
+        self._programs.stop()
         return Outcome.DONE
 
     def pause(self) -> Outcome:
