@@ -1,39 +1,43 @@
 """Digital and analogue inputs and outputs, of the box and of the tool."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
-from sim_twin.controller.io import N_DIGITAL
 from sim_twin.controller.machine import Machine
 from sim_twin.controller.script import Builtins, Value
 from sim_twin.controller.script.builtins import flag, integer, number
 
 __all__ = ["terminal_builtins"]
 
-# Name, first bit, how many.
-_KINDS = (("standard_", 0, 8), ("configurable_", 8, 8), ("tool_", 16, 2), ("", 0, N_DIGITAL))
+# The deprecated names without a kind know the tool's terminals as 8 and 9 (e-Series script directory).
+_KINDS = {
+    "standard_": range(8),
+    "configurable_": range(8, 16),
+    "tool_": range(16, 18),
+    "": (*range(8), *range(16, 18)),
+}
 _FIRST_OF_TOOL = 2
 
 
 def terminal_builtins(machine: Machine) -> Builtins:
     """Return the setters and getters of terminals."""
     found: dict[str, Callable[..., Value]] = {}
-    for kind, first, n in _KINDS:
-        found[f"set_{kind}digital_out"] = _switch(machine, first, n)
-        found[f"get_{kind}digital_out"] = _reader(lambda: machine.io.digital_out, first, n)
-        found[f"get_{kind}digital_in"] = _reader(lambda: machine.io.digital_in, first, n)
+    for kind, bits in _KINDS.items():
+        found[f"set_{kind}digital_out"] = _switch(machine, bits)
+        found[f"get_{kind}digital_out"] = _reader(lambda: machine.io.digital_out, bits)
+        found[f"get_{kind}digital_in"] = _reader(lambda: machine.io.digital_in, bits)
     return {**found, **_analogue_inputs(machine), **_analogue_outputs(machine), **_flags(machine)}
 
 
-def _switch(machine: Machine, first: int, n_bits: int) -> Callable[..., Value]:
+def _switch(machine: Machine, bits: Sequence[int]) -> Callable[..., Value]:
     def switch(n: Value, b: Value) -> Value:
-        machine.io.set_digital_out(first + _below(n, n_bits), flag(b))
+        machine.io.set_digital_out(bits[_below(n, len(bits))], flag(b))
 
     return switch
 
 
-def _reader(bits: Callable[[], int], first: int, n_bits: int) -> Callable[..., Value]:
+def _reader(terminals: Callable[[], int], bits: Sequence[int]) -> Callable[..., Value]:
     def read(n: Value) -> Value:
-        return bool(bits() >> first + _below(n, n_bits) & 1)
+        return bool(terminals() >> bits[_below(n, len(bits))] & 1)
 
     return read
 
