@@ -6,15 +6,17 @@ from msgspec import Meta
 
 from config.values import Name, Section
 
-__all__ = ["N_SIGNALS", "CellConfig", "CellInput", "CellOutput", "pin_number"]
+__all__ = ["N_SIGNALS", "CellAnalogInput", "CellConfig", "CellInput", "CellOutput", "pin_number"]
 
 N_SIGNALS = 16
-_FIRST = {"D": 0, "C": 8}
+_FIRST = {"D": 0, "C": 8, "A": 0}
 
 Signal = Annotated[int, Meta(ge=0, lt=N_SIGNALS)]
 """The number that a scenario gives an input (of a button or a box's sensor) or an output (of a lamp or a lid)."""
 InputPin = Annotated[str, Meta(pattern=r"^(DI|CI)[0-7]\Z")]
 OutputPin = Annotated[str, Meta(pattern=r"^(DO|CO)[0-7]\Z")]
+AnalogInputPin = Annotated[str, Meta(pattern=r"^AI[01]\Z")]
+Volts = Annotated[float, Meta(ge=0.0, le=10.0)]
 
 
 class CellInput(Section, frozen=True, kw_only=True):
@@ -40,6 +42,17 @@ class CellOutput(Section, frozen=True, kw_only=True):
     """How long a pulse is; for a bistable drive only."""
 
 
+class CellAnalogInput(Section, frozen=True, kw_only=True):
+    """How far a button is pressed, as a voltage beside its contact, for other readers of the controller than this."""
+
+    signal: Signal
+    """The number of the button's input."""
+    pin: AnalogInputPin
+    """As printed on the control box: AI0 or AI1."""
+    volts: tuple[Volts, Volts] = (0.0, 10.0)
+    """Released, and at the end of its travel; in between in proportion."""
+
+
 class CellConfig(Section, frozen=True, kw_only=True):
     """Where a UR control box has the table's buttons, sensors, lamps and lids."""
 
@@ -47,8 +60,9 @@ class CellConfig(Section, frozen=True, kw_only=True):
     description: str = ""
     inputs: Annotated[tuple[CellInput, ...], Meta(min_length=1, max_length=N_SIGNALS)]
     outputs: Annotated[tuple[CellOutput, ...], Meta(min_length=1, max_length=N_SIGNALS)]
+    analog_inputs: Annotated[tuple[CellAnalogInput, ...], Meta(max_length=2)] = ()
 
 
 def pin_number(pin: str) -> int:
-    """Return a terminal's bit as RTDE numbers them: standard 0 to 7, configurable 8 to 15."""
+    """Return a terminal's number as RTDE has it: standard 0 to 7, configurable 8 to 15; analogue ones 0 and 1."""
     return _FIRST[pin[0]] + int(pin[2])

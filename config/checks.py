@@ -138,7 +138,7 @@ def check_rig(rig: Rig, file: str) -> None:
 
 
 def check_cell(cell: CellConfig, file: str) -> None:
-    """Check that every signal is wired once and no terminal twice, and that pulses have two coils and a length."""
+    """Check that every signal is wired once and no terminal twice, that pulses are whole, and that voltages differ."""
     checker = _Checker(file)
     for key, wires in (("inputs", cell.inputs), ("outputs", cell.outputs)):
         checker.unique(((f"{key}[{i}].signal", str(wire.signal)) for i, wire in enumerate(wires)), "a signal")
@@ -146,6 +146,10 @@ def check_cell(cell: CellConfig, file: str) -> None:
     pins = [(f"outputs[{i}].pin", wire.pin) for i, wire in enumerate(cell.outputs)]
     pins += [(f"outputs[{i}].off_pin", wire.off_pin) for i, wire in enumerate(cell.outputs) if wire.off_pin is not None]
     checker.unique(pins, "a terminal")
+    checker.unique(((f"analog_inputs[{i}].pin", wire.pin) for i, wire in enumerate(cell.analog_inputs)), "a terminal")
+    for i, (released, pressed) in enumerate(wire.volts for wire in cell.analog_inputs):
+        got = f"{released:g} and {pressed:g}"
+        checker.need(released != pressed, f"analog_inputs[{i}].volts", "two voltages that differ", got)
     for i, wire in enumerate(cell.outputs):
         has_both = (wire.off_pin is None) == (wire.pulse_s is None)
         checker.need(has_both, f"outputs[{i}].pulse_s", "off_pin and pulse_s, or neither", "one of them")

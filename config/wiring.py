@@ -39,10 +39,10 @@ def check_wiring(scenario: Scenario, rules: RuleSet, file: str) -> None:
 
 
 def check_cell_fits(scenario: Scenario, cell: CellConfig, file: str) -> None:
-    """Check that a cell has a terminal for every signal of a scenario.
+    """Check that a cell has a terminal for every signal of a scenario, and measures the travel of buttons only.
 
     Raises:
-        ConfigError: it lacks one, named as the scenario names it.
+        ConfigError: it lacks one, named as the scenario names it; or what it measures is no button.
     """
     inputs, outputs = signals_of(scenario)
     for key, needed, wired in (
@@ -52,6 +52,11 @@ def check_cell_fits(scenario: Scenario, cell: CellConfig, file: str) -> None:
         for signal, what in needed.items():
             if signal not in wired:
                 raise ConfigError(file, key, f"signal {signal}, {what} of scenario {scenario.name}", "no such entry")
+    buttons = sorted(button.input for button in scenario.buttons)
+    for i, wire in enumerate(cell.analog_inputs):
+        if wire.signal not in buttons:
+            expected = f"the input of a button of scenario {scenario.name}: {', '.join(map(str, buttons))}"
+            raise ConfigError(file, f"analog_inputs[{i}].signal", expected, str(wire.signal))
 
 
 def signals_of(scenario: Scenario) -> tuple[dict[int, str], dict[int, str]]:

@@ -19,8 +19,13 @@ class _Switch:
         address = int(model.joint(on_table(button.name, "travel")).qposadr[0])
         self._travel_m = data.qpos[address : address + 1]
         self._closes_m, self._opens_m = CLOSES_AT * button.travel_m, OPENS_AT * button.travel_m
-        self._bit = 1 << button.input
+        self._bit, self._span_m = 1 << button.input, button.travel_m
         self.is_closed = False
+
+    @property
+    def travel(self) -> float:
+        """How far it is pressed, as a share of its travel."""
+        return min(max(self._travel_m.item() / self._span_m, 0.0), 1.0)
 
     def read(self) -> int:
         """Return the input's bit."""
@@ -97,6 +102,7 @@ class TableDrive:
 
     def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, scenario: Scenario, *, tick_s: float) -> None:
         self._switches = [_Switch(model, data, b) for b in scenario.buttons]
+        self._switch_by_input = {b.input: s for b, s in zip(scenario.buttons, self._switches, strict=True)}
         self._lids = [_Lid(model, b, tick_s) for b in scenario.boxes if b.lid is not None]
         self._presences = [
             _Presence(model, data, b, scenario.cylinders) for b in scenario.boxes if b.presence_input is not None
@@ -122,3 +128,11 @@ class TableDrive:
         for presence in self._presences:
             bits |= presence.read()
         return bits
+
+    def travel(self, input_number: int) -> float:
+        """Return how far a button is pressed, as a share of its travel.
+
+        Raises:
+            KeyError: no button has this input.
+        """
+        return self._switch_by_input[input_number].travel

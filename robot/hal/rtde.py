@@ -95,7 +95,8 @@ class RtdeArm:
         """Open the clients that read, and check that this is the arm of the file. Moves nothing, stops nothing.
 
         Raises:
-            WireError: somebody does not answer.
+            WireError: somebody does not answer, the hand among them.
+            StaleStateError: the controller's own time stands still.
             RobotConfigError: another arm than the rig names, another model or software than this backend is for.
             ArmRefusedError: the arm is stopped, and its hand without power.
         """
@@ -290,11 +291,16 @@ class RtdeArm:
         """Return what the hand says; of an arm that does not run the stop is told, not the hand that it leaves dead."""
         try:
             return self._grip_now()
+        except StaleStateError:
+            raise
         except WireError as error:
-            status = self.status()
-            is_running = mode_of(status.robot_mode, status.safety_bits) is ArmMode.RUNNING
-            if is_running or isinstance(error, StaleStateError):
-                raise
+            self._refuse_unpowered(error)
+            raise
+
+    def _refuse_unpowered(self, error: WireError) -> None:
+        """Raise for the arm's stop, where it is stopped, in place of what its hand's silence is told by."""
+        status = self.status()
+        if mode_of(status.robot_mode, status.safety_bits) is not ArmMode.RUNNING:
             why = why_refused(status)
             raise ArmRefusedError(f"arm: expected it running and its hand powered, came: {why}; {error}") from error
 
@@ -318,12 +324,25 @@ class RtdeArm:
         while True:
             try:
                 self.read()
-            except StaleStateError:
+            except StaleStateError as error:
                 if monotonic_ns() > deadline_ns:
+                    self._blame_hand(error)
                     raise
                 self.clock.wait_tick()
             else:
                 return
+
+    def _blame_hand(self, error: StaleStateError) -> None:
+        """Raise for the hand, where only its state is missing: no other process would hear more of it than this one."""
+        if self._gripper.state is not None:
+            return
+        self._note_freshness(self._reading()[0])
+        mute = WireError(
+            f"gripper: expected its position and whether it holds something within {START_S:g} s of connecting, came "
+            "neither; has the tool power, is it plugged in, and does its page on the pendant show it?"
+        )
+        self._refuse_unpowered(mute)
+        raise mute from error
 
     def _see_running(self) -> None:
         """Wait a tick and look at arm and hand; where the arm may not move the hand may not either."""

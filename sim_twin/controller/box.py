@@ -1,5 +1,7 @@
 """How the twin's table is wired to the virtual control box. Written apart from the client's side of the same wires."""
 
+from collections.abc import Callable
+
 from config.cell import CellConfig, pin_number
 from sim_twin.controller.io import BOX_BITS
 
@@ -28,6 +30,18 @@ class Box:
             is_high = bool(signals >> wire.signal & 1) is not wire.inverted
             pins |= is_high << pin_number(wire.pin)
         return pins
+
+    def measure(self, travel: Callable[[int], float]) -> list[float]:
+        """Return the voltages at the two analogue inputs (V); 0 where nothing is wired.
+
+        Args:
+            travel: Returns how far the button with an input's number is pressed, as a share.
+        """
+        volts = [0.0, 0.0]
+        for wire in self._cell.analog_inputs if self._cell is not None else ():
+            released, pressed = wire.volts
+            volts[pin_number(wire.pin)] = released + (pressed - released) * travel(wire.signal)
+        return volts
 
     def drive(self, pins: int) -> int:
         """Return what the table's lamps and lids get from the output terminals."""

@@ -58,11 +58,16 @@ class Compiled:
 class Start:
     """What comes of a text that is to start.
 
+    Args:
+        n_stops: How many stops had come when it was sent.
+
     Attributes:
+        n_stops: As given; a later stop takes it back.
         has_begun: Its program has begun, or never will; None while that is not known.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, *, n_stops: int = 0) -> None:
+        self.n_stops = n_stops
         self.has_begun: bool | None = None
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from sim_twin.controller.io import N_DIGITAL
 from sim_twin.controller.motion import DhRow, Measured, calibrated
 from sim_twin.controller.robot import VirtualRobot
-from sim_twin.controller.states import Event
+from sim_twin.controller.states import Event, Reaction
 from sim_twin.controller.ticks import TickTimes
 from sim_twin.controller.wire import Wires, input_fields
 
@@ -72,7 +72,7 @@ class Faults:
             "noise": self.noise,
             "payload": self.payload,
             "program": lambda: {"text": self._robot.programs.last_text},
-            "program_stop": lambda: self._happen(Event.STOP),
+            "program_stop": lambda: _told(self._robot.programs.stop()),
             "protective_stop": lambda: self._happen(Event.PROTECTIVE_STOP),
             "push": self.push,
             "reduced": self.reduced,
@@ -232,8 +232,7 @@ class Faults:
     # -------------------------------------------------------------------------------------------------------- inside
 
     def _happen(self, event: Event) -> Answer:
-        refusal = self._robot.programs.handle(event).refusal
-        return {} if refusal is None else {"refusal": refusal}
+        return _told(self._robot.programs.handle(event))
 
     def _ports(self, number: int | None) -> list:
         ports = self._wires.port_by_number
@@ -251,6 +250,10 @@ class Faults:
         drive = self._robot.machine.drive
         q = measured.q_rad + self._bias_rad + self._rng.normal(0.0, 1.0, 6) * self._noise_rad
         return msgspec.structs.replace(measured, q_rad=q, tcp_pose=drive.kinematics.pose(q, drive.core.tcp_offset))
+
+
+def _told(reaction: Reaction) -> Answer:
+    return {} if reaction.refusal is None else {"refusal": reaction.refusal}
 
 
 def _typed(name: str, fault: Callable[..., Answer | None], numbers: Mapping[str, object]) -> dict[str, object]:

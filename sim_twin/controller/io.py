@@ -35,9 +35,10 @@ class InputsOutputs:
     Attributes:
         digital_in: Input bits, of the slice before.
         digital_out: Output bits.
-        analog_in: Two inputs of the box, as shares of their range.
-        analog_out: Two outputs of the box, likewise.
-        analog_out_domain: 0 for current, 1 for voltage, of each.
+        analog_in_v: Voltages at the box's two analogue inputs, of the slice before.
+        analog_in_domain: 0 for current, 1 for voltage, of each; voltage, as installations have it from the start.
+        analog_out: Two outputs of the box, as shares of their range.
+        analog_out_domain: As of inputs; current from the start.
         tool_analog_in: Two inputs of the tool.
         tool_voltage_v: 0, 12 or 24.
         flags: The program's 32 flags (set_flag).
@@ -46,8 +47,8 @@ class InputsOutputs:
 
     def __init__(self, *, set_slider: Callable[[float], None]) -> None:
         self.digital_in = self.digital_out = 0
-        self.analog_in, self.analog_out = [0.0, 0.0], [0.0, 0.0]
-        self.analog_out_domain = [0, 0]
+        self.analog_in_v, self.analog_out = [0.0, 0.0], [0.0, 0.0]
+        self.analog_in_domain, self.analog_out_domain = [1, 1], [0, 0]
         self.tool_analog_in = [0.0, 0.0]
         self.tool_voltage_v = 0
         self.flags = [False] * 32
@@ -74,6 +75,15 @@ class InputsOutputs:
         for group, fresh in self._fresh.items():
             if fresh:
                 self._apply(group)
+
+    def analog_input(self, i: int) -> float:
+        """Return what an input reads, in V or A by its domain: nothing wired here drives a current."""
+        return self.analog_in_v[i] if self.analog_in_domain[i] else 0.0
+
+    def analog_output(self, i: int) -> float:
+        """Return what an output gives, in V (0 to 10) or A (0.004 to 0.02) by its domain."""
+        share = self.analog_out[i]
+        return share * 10.0 if self.analog_out_domain[i] else 0.004 + 0.016 * share
 
     def set_digital_out(self, bit: int, is_on: bool) -> None:
         """Switch one output."""

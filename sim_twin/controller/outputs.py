@@ -165,20 +165,19 @@ def _modes(machine: Machine, programs: Programs) -> Getters:
 def _terminals(machine: Machine) -> Getters:
     io = machine.io
 
-    def analog(i: int) -> float:
-        share = io.analog_out[i]
-        return share * 10.0 if io.analog_out_domain[i] else 0.004 + 0.016 * share
+    def domains() -> int:
+        return sum(domain << i for i, domain in enumerate((*io.analog_in_domain, *io.analog_out_domain)))
 
     return {
         "actual_digital_input_bits": lambda: io.digital_in,
         "actual_digital_output_bits": lambda: io.digital_out,
         "actual_configurable_digital_input_bits": lambda: io.digital_in >> 8 & _BYTE,
         "actual_configurable_digital_output_bits": lambda: io.digital_out >> 8 & _BYTE,
-        "analog_io_types": lambda: io.analog_out_domain[0] << 2 | io.analog_out_domain[1] << 3,
-        "standard_analog_input0": lambda: io.analog_in[0],
-        "standard_analog_input1": lambda: io.analog_in[1],
-        "standard_analog_output0": lambda: analog(0),
-        "standard_analog_output1": lambda: analog(1),
+        "analog_io_types": domains,
+        "standard_analog_input0": lambda: io.analog_input(0),
+        "standard_analog_input1": lambda: io.analog_input(1),
+        "standard_analog_output0": lambda: io.analog_output(0),
+        "standard_analog_output1": lambda: io.analog_output(1),
         "tool_analog_input0": lambda: io.tool_analog_in[0],
         "tool_analog_input1": lambda: io.tool_analog_in[1],
         "tool_output_voltage": lambda: io.tool_voltage_v,

@@ -119,8 +119,8 @@ class Panel:
         return lambda: _STARTED[start.has_begun]
 
     def stop(self) -> Outcome:
-        """Stop whatever runs; UR answers alike where nothing does."""
-        self._programs.handle(Event.STOP)
+        """Stop whatever runs or is about to; UR answers alike where nothing does."""
+        self._programs.stop()
         return Outcome.DONE
 
     def pause(self) -> Outcome:
@@ -195,7 +195,10 @@ class Panel:
             masterboard=MasterboardData(
                 digital_inputs=io.digital_in,
                 digital_outputs=io.digital_out,
-                analog_outputs=(io.analog_out[0], io.analog_out[1]),
+                analog_input_ranges=(io.analog_in_domain[0], io.analog_in_domain[1]),
+                analog_inputs=(io.analog_input(0), io.analog_input(1)),
+                analog_output_domains=(io.analog_out_domain[0], io.analog_out_domain[1]),
+                analog_outputs=(io.analog_output(0), io.analog_output(1)),
                 temperature_c=CONTROLLER_C,
                 safety_mode=int(machine.modes.safety),
                 is_reduced=machine.modes.is_reduced,

@@ -35,6 +35,7 @@ class Programs:
         self.last_text = ""
         self._next: tuple[Compiled, Start] | None = None
         self._secondary: list[Compiled] = []
+        self._n_stops = 0
 
     @property
     def line(self) -> int:
@@ -44,9 +45,20 @@ class Programs:
     def submit(self, text: str) -> Start:
         """Take a program's text: a `def` replaces the one that runs, a `sec` runs beside it. Tells what comes of it."""
         self.last_text = text
-        start = Start()
+        start = Start(n_stops=self._n_stops)
         self._compiler.submit(text, start)
         return start
+
+    def stop(self) -> Reaction:
+        """Stop what runs and let nothing start that was sent before, compiled or not. Secondary programs go on.
+
+        So somebody stops the robot. A program that stops itself, starves or is replaced takes none with it.
+        """
+        self._n_stops += 1
+        if self._next is not None:
+            self._turn_down(*self._next, "it was stopped before it began")
+            self._next = None
+        return self.handle(Event.STOP)
 
     def handle(self, event: Event, *, joint: int | None = None) -> Reaction:
         """Let an event happen: modes, arm and program."""
@@ -99,9 +111,11 @@ class Programs:
         elif done.is_secondary:
             self._secondary.append(done)
             start.has_begun = True
+        elif start.n_stops < self._n_stops:
+            self._turn_down(done, start, "it was stopped before it began")
         else:
             if self._next is not None:
-                self._next[1].has_begun = False
+                self._turn_down(*self._next, "another came before it began")
             self._next = done, start
 
     def _replace(self, program: Compiled, start: Start) -> None:
@@ -113,14 +127,18 @@ class Programs:
             return
         self._next = None
         refusal = self.handle(Event.PLAY).refusal
-        start.has_begun = refusal is None
         if refusal is not None:
-            program.close()
-            self._machine.journal.note(f"program {program.name or UNNAMED} was not started: {refusal}")
+            self._turn_down(program, start, refusal)
             return
+        start.has_begun = True
         self.main = program
         self._machine.begin_program()
         self._machine.journal.key("PROGRAM_XXX_STARTED", program.name or UNNAMED)
+
+    def _turn_down(self, program: Compiled, start: Start, why: str) -> None:
+        program.close()
+        start.has_begun = False
+        self._machine.journal.note(f"program {program.name or UNNAMED} was not started: {why}")
 
     def _finish(self, program: Compiled) -> None:
         """Come to rest after a program's end; say why, where it failed."""

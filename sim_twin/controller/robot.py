@@ -110,6 +110,7 @@ class VirtualRobot:
         self.programs.obey(machine.modes.tick(is_standing=drive.is_standing))
         machine.n_standing = machine.n_standing + 1 if drive.is_standing else 0
         machine.io.digital_in = self.box.sense(machine.world.table.read_inputs()) | self.forced_inputs
+        machine.io.analog_in_v = self.box.measure(machine.world.table.travel)
         self.hand.tick()
 
     @property

@@ -37,6 +37,34 @@ def test_a_pulsed_drive_cannot_be_inverted(tmp_path):
         load_cell(write(tmp_path, "cell.yaml", tree))
 
 
+@pytest.mark.parametrize(
+    ("wires", "said"),
+    [
+        ([{"signal": 0, "pin": "AI2"}], r"analog_inputs\[0\]\.pin"),
+        ([{"signal": 0, "pin": "AI0"}, {"signal": 1, "pin": "AI0"}], r"analog_inputs\[1\]\.pin.*terminal"),
+        ([{"signal": 0, "pin": "AI0", "volts": [0.0, 10.5]}], r"analog_inputs\[0\]\.volts"),
+        ([{"signal": 0, "pin": "AI0", "volts": [3.0, 3.0]}], r"analog_inputs\[0\]\.volts.*differ"),
+    ],
+)
+def test_a_wrong_analogue_wire_is_told_by_its_place(tmp_path, wires, said):
+    tree = shipped_tree("cells", "ur_box") | {"analog_inputs": wires}
+    with pytest.raises(ConfigError, match=said):
+        load_cell(write(tmp_path, "cell.yaml", tree))
+
+
+def test_only_a_buttons_travel_is_measured(tmp_path):
+    rig = shipped_tree("rigs", "virtual_lab") | {"cell": "./cell.yaml"}
+    for signal, is_right in ((0, True), (9, False)):
+        wires = [{"signal": signal, "pin": "AI1", "volts": [10.0, 0.0]}]
+        write(tmp_path, "cell.yaml", shipped_tree("cells", "ur_box") | {"analog_inputs": wires})
+        path = write(tmp_path, "rig.yaml", rig)
+        if is_right:
+            assert resolve(rig=path).cell.analog_inputs[0].volts == (10.0, 0.0)
+        else:
+            with pytest.raises(ConfigError, match=r"analog_inputs\[0\]\.signal.*button of scenario paper.*9"):
+                resolve(rig=path)
+
+
 def test_a_cell_that_lacks_a_signal_of_the_scenario_is_refused_by_what_it_is(tmp_path):
     cell, rig = shipped_tree("cells", "ur_box"), shipped_tree("rigs", "virtual_lab")
     cell["outputs"] = [wire for wire in cell["outputs"] if wire["signal"] != 4]

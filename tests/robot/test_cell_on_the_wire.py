@@ -12,7 +12,7 @@ from robot.bus.virtual_table import VirtualSomebody
 from robot.cell_check import Wire
 from robot.errors import RobotConfigError
 from robot.hal.rtde_plant import RtdePlant
-from robot.messages import GripCommand
+from robot.messages import ArmCommand, GripCommand
 from robot.tick_loop import TickLoop
 from tests.support.small_lab import SERIAL, autotelic, controller_of, make_lab, start
 
@@ -173,3 +173,38 @@ def test_the_cell_program_sees_the_button_and_drives_lamp_and_lid_through_these_
             assert controller.fault("truth")["digital_out"] & 1 << 6 == 0  # the pulse is over
         finally:
             loop.close()
+
+
+def test_pulses_and_levels_reach_their_terminals_and_a_stop_in_a_pulse_leaves_no_coil_under_current(lab):
+    folder, controller = lab
+    resolved = resolve(rig=folder / "rig.yaml", scenario=folder / "small.yaml")
+    arm = RtdePlant(arm=resolved.arm, scenario=resolved.scenario, rig=resolved.rig, cell=resolved.cell).arm
+
+    def tick(n, digital_out):
+        """Return the terminals of lamp and lid after some ticks: lamp 0 (inverted), the coil that opens, that shuts."""
+        for k in range(n):
+            arm.write(
+                ArmCommand(
+                    stamp_ns=arm.clock.now_ns(), sequence=k, q_rad=q_rad, grip=OPEN_HAND, digital_out=digital_out
+                )
+            )
+            arm.clock.wait_tick()
+            arm.read()
+        return terminals()
+
+    def terminals():
+        pins = controller.fault("truth")["digital_out"]
+        return tuple(pins >> i & 1 for i in (11, 6, 8))
+
+    try:
+        arm.connect()
+        arm.engage()
+        q_rad = arm.read().q_rad
+        assert tick(10, 0b101) == (0, 1, 0)
+        assert tick(100, 0b101) == (0, 0, 0), "the pulse is over, the level stays"
+        assert tick(10, 0b000) == (1, 0, 1)
+        assert arm.stop()
+        assert terminals() == (1, 0, 0)
+        assert arm.read().digital_out == 0
+    finally:
+        arm.close()

@@ -17,7 +17,7 @@ from tests.support.loopback import own_address
 pytest.importorskip("rtde_control", reason="the genuine client comes with `pip install autotelic[lab]`")
 
 CONFIG = load_arm("ur5e")
-DASHBOARD = 29999
+DASHBOARD, RTDE = 29999, 30004
 
 
 @pytest.fixture(scope="module")
@@ -122,6 +122,43 @@ def test_a_dashboard_that_hung_up_is_said_by_name(controller, arm):
     controller.fault("drop", port=DASHBOARD)
     with pytest.raises(WireError, match="dashboard"):
         arm.engage()
+
+
+@contextmanager
+def frozen(controller, *ports):
+    for port in ports:
+        controller.fault("freeze", on=True, port=port)
+    try:
+        yield
+    finally:
+        for port in ports:
+            controller.fault("freeze", on=False, port=port)
+
+
+def test_a_hand_that_is_mute_while_the_arm_is_connected_is_named_and_no_reason_to_end_the_process(
+    controller, monkeypatch
+):
+    from robot.hal import rtde
+
+    monkeypatch.setattr(rtde, "START_S", 0.2)
+    mute = rtde.RtdeArm(arm=CONFIG, address=controller.host)
+    try:
+        with frozen(controller, GRIPPER_PORT), pytest.raises(WireError, match=r"gripper: .*power.*plugged") as told:
+            mute.connect()
+        assert not isinstance(told.value, StaleStateError)
+    finally:
+        mute.close()
+
+
+def test_a_controller_whose_time_stands_still_is_stale_whatever_its_hand_says(controller, arm, monkeypatch):
+    from robot.hal import rtde
+
+    monkeypatch.setattr(rtde, "START_S", 0.2)
+    with frozen(controller, GRIPPER_PORT, RTDE):
+        arm._gripper.close()
+        arm._gripper.connect(controller.host)
+        with pytest.raises(StaleStateError, match="newest is"):
+            arm._wait_first_state()
 
 
 def test_a_program_that_a_protective_stop_has_paused_is_seen_to_end():

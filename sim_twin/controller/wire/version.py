@@ -5,11 +5,10 @@ import msgspec
 __all__ = ["ControllerVersion"]
 
 _CB3_MAJOR = 3
-_X_MAJOR = 10
 
 
 class ControllerVersion(msgspec.Struct, frozen=True, kw_only=True):
-    """PolyScope's version: 3.x runs a CB3 box, 5.x an e-Series, 10.x PolyScope X."""
+    """PolyScope's version: 3.x runs a CB3 box, 5.x an e-Series."""
 
     major: int = 5
     minor: int = 11
@@ -20,11 +19,6 @@ class ControllerVersion(msgspec.Struct, frozen=True, kw_only=True):
     def is_cb3(self) -> bool:
         """Whether the box is a CB3, which serves 125 Hz and fewer fields."""
         return self.major <= _CB3_MAJOR
-
-    @property
-    def is_polyscope_x(self) -> bool:
-        """Whether it is PolyScope X, which has no dashboard port and whose Robotiq app opens none."""
-        return self.major >= _X_MAJOR
 
     def has(self, since_e: tuple[int, ...] | None, since_cb3: tuple[int, ...] | None) -> bool:
         """Tell whether something that came with these versions exists here; None means that it never came."""

@@ -50,7 +50,6 @@ class Wires:
         self.states = StatePorts(states=states, scripts=scripts, version=version, stamp_us=stamp_us)
         self._dashboard = DashboardServer(target=dashboard, version=version)
         self._gripper = None if gripper is None else GripperServer(target=gripper)
-        self._version = version
         self._reactor = Reactor()
         self._port_by_number: dict[int, Port] = {}
 
@@ -78,12 +77,11 @@ class Wires:
         """
         listen = self._reactor.listen
         try:
-            if not self._version.is_polyscope_x:
-                self._port_by_number[DASHBOARD] = listen(host, 0 if is_free else DASHBOARD, self._dashboard, _LINES)
+            self._port_by_number[DASHBOARD] = listen(host, 0 if is_free else DASHBOARD, self._dashboard, _LINES)
             self._port_by_number[RTDE] = listen(host, 0 if is_free else RTDE, self.rtde, _REGISTERS)
             for number, service in self.states.by_number.items():
                 self._port_by_number[number] = listen(host, 0 if is_free else number, service, SCRIPT_BUDGET)
-            if self._gripper is not None and not self._version.is_polyscope_x:
+            if self._gripper is not None:
                 self._port_by_number[GRIPPER] = listen(host, 0 if is_free else GRIPPER, self._gripper, _LINES)
         except OSError:
             self.close()

@@ -98,6 +98,7 @@ def test_every_copy_is_named_with_what_it_copies(robot):
 MAY_MOVE = {
     *["actual_digital_input_bits", "actual_digital_output_bits", "actual_configurable_digital_input_bits"],
     *["actual_configurable_digital_output_bits", "analog_io_types", "standard_analog_output0"],
+    *["standard_analog_input0", "standard_analog_input1"],
     *["standard_analog_output1", "tool_output_voltage", "tcp_offset", "payload", "payload_cog", "payload_inertia"],
     *["target_gravity", "target_speed_fraction", "safety_mode", "safety_status", "safety_status_bits"],
     *["joint_mode", "tool_mode", "robot_mode", "robot_status_bits", "speed_scaling"],

@@ -1,6 +1,7 @@
 """Programs of the virtual robot: what starts, pauses, stops and replaces them. Without ports, the same every time."""
 
 import math
+from threading import Event as Gate
 
 import pytest
 
@@ -116,6 +117,79 @@ def test_play_fails_where_another_program_comes_before_it_has_begun():
     assert (first.has_begun, second.has_begun) == (None, None)
     run(robot, 10)
     assert (first.has_begun, second.has_begun) == (False, True)
+
+
+@pytest.fixture
+def slow():
+    """A robot whose compiler's thread waits at a gate, as it does for a script of 40 kB, and that gate."""
+    gate = Gate()
+
+    def behind_the_gate(make_builtins):
+        return ThreadCompiler(lambda sockets: (gate.wait(5.0), make_builtins(sockets))[1])
+
+    robot = make_robot(compiler=behind_the_gate)
+    yield robot, gate
+    gate.set()
+    robot.close()
+
+
+def played(robot):
+    robot.programs.shelf["a.urp"] = "def slow():\n set_digital_out(1, True)\n while True:\n  sync()\n end\nend\n"
+    robot.panel.load("a.urp")
+    return robot.panel.play()
+
+
+def test_what_still_compiles_when_the_dashboard_stops_does_not_start(slow):
+    robot, gate = slow
+    awaited = played(robot)
+    run(robot, 3)
+    assert (robot.panel.stop(), awaited()) == (Outcome.DONE, None)
+    gate.set()
+    run(robot, 5000, awaited)
+    run(robot, 20)
+    assert (awaited(), state_of(robot)) == (Outcome.FAILED, STOPPED)
+    assert robot.machine.io.digital_out == 0
+    assert any("slow was not started: it was stopped" in line for line in lines(robot))
+    awaited = played(robot)
+    run(robot, 5000, awaited)
+    assert (awaited(), state_of(robot)) == (Outcome.DONE, PLAYING), "the next is not dropped too"
+
+
+def test_a_stop_drops_scripts_that_were_sent_before_it_and_none_that_come_after(slow):
+    robot, gate = slow
+    robot.submit_script("def before():\n set_digital_out(1, True)\n while True:\n  sync()\n end\nend\n")
+    robot.submit_script("sec beside():\n set_digital_out(3, True)\nend\n")
+    robot.panel.stop()
+    robot.submit_script("def after():\n set_digital_out(2, True)\n while True:\n  sync()\n end\nend\n")
+    gate.set()
+    run(robot, 5000, lambda: state_of(robot) is PLAYING)
+    run(robot, 20)
+    assert robot.programs.main.name == "after"
+    assert robot.machine.io.digital_out == 1 << 2 | 1 << 3, "no stop ends a secondary program"
+
+
+def test_a_stop_drops_what_waits_for_the_arm_to_come_to_rest():
+    robot = started("def f():\n speedj([0.5, 0, 0, 0, 0, 0], 2, 20)\nend\n")
+    run(robot, 300)
+    start = robot.programs.submit(FOREVER)
+    run(robot, 2)
+    assert (state_of(robot), start.has_begun) == (RuntimeState.STOPPING, None)
+    robot.panel.stop()
+    run(robot, 500)
+    assert (state_of(robot), start.has_begun, robot.programs.main) == (STOPPED, False, None)
+
+
+def test_a_program_that_ends_or_stops_itself_takes_nothing_along_that_was_sent_meanwhile(slow):
+    robot, gate = slow
+    gate.set()
+    robot.submit_script("def f():\n sleep(0.5)\n halt\nend\n")
+    run(robot, 5000, lambda: state_of(robot) is PLAYING)
+    gate.clear()
+    robot.submit_script(FOREVER)
+    ended(robot)
+    gate.set()
+    run(robot, 5000, lambda: state_of(robot) is PLAYING)
+    assert robot.programs.main.name == "waits"
 
 
 def test_local_control_refuses_programs():

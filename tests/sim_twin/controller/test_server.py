@@ -29,7 +29,7 @@ def test_only_loopback_is_listened_on_unless_asked():
         ControllerServer(Setup(host="10.1.2.3"))
 
 
-@pytest.mark.parametrize("text", ["", "5", "a.b", "1.2.3.4.5", "5.-1"])
+@pytest.mark.parametrize("text", ["", "5", "a.b", "1.2.3.4.5", "5.-1", "10.9.0"])
 def test_a_version_is_numbers(text):
     with pytest.raises(ValueError, match="version"):
         parse_version(text)

@@ -7,6 +7,7 @@ import pytest
 from sim_twin.controller.io import InputsOutputs
 from sim_twin.controller.registers import Registers
 from sim_twin.controller.watchdogs import WatchdogAction, Watchdogs
+from tests.support.virtual_robot import make_robot, run
 
 
 def test_registers_keep_what_fits_and_refuse_the_rest():
@@ -37,6 +38,27 @@ def test_two_packages_in_one_slice_both_count():
     io.set_digital_out(5, False)
     io.apply()
     assert io.digital_out == 1 | 1 << 8, "what was written once is not written again"
+
+
+@pytest.mark.parametrize(
+    ("call", "bit"),
+    [
+        ("set_standard_digital_out(7, True)", 7),
+        ("set_configurable_digital_out(0, True)", 8),
+        ("set_tool_digital_out(1, True)", 17),
+        ("set_digital_out(7, True)", 7),
+        ("set_digital_out(8, True)", 16),
+        ("set_digital_out(9, True)", 17),
+        ("set_digital_out(10, True)", None),
+    ],
+)
+def test_programs_switch_the_terminal_that_they_name_and_read_it_back(call, bit):
+    robot = make_robot()
+    read = call.replace("set", "get", 1).replace(", True", "")
+    robot.submit_script(f"def f():\n {call}\n write_output_boolean_register(64, {read})\nend\n")
+    run(robot, 20)
+    assert robot.machine.io.digital_out == (0 if bit is None else 1 << bit)
+    assert robot.machine.registers.outputs.bit_at(64) is (bit is not None)
 
 
 @pytest.mark.parametrize(

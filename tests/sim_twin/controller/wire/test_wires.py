@@ -33,10 +33,6 @@ def test_without_a_gripper_its_port_stays_shut():
         assert set(wires.port_by_number) == NUMBERS - {63352}
 
 
-def test_polyscope_x_has_neither_a_dashboard_nor_a_gripper_port(make_bench):
-    assert set(make_bench(ControllerVersion(major=10, minor=9)).wires.port_by_number) == NUMBERS - {29999, 63352}
-
-
 def test_a_port_that_is_taken_leaves_nothing_open():
     robot = Robot(ControllerVersion())
     host = "127.0.3.7"
