@@ -245,6 +245,8 @@ class RobotiqGripper:
         while line.startswith(ACKNOWLEDGED):  # sent without an end of line, before the next answer
             line = line[len(ACKNOWLEDGED) :]
         words = line.split()
+        if words == [NO_VALUE] and (self._is_watched or self._is_activating):
+            raise WireError("gripper: expected `ack` of what it was told, came `?`: it does not take it")
         if len(words) == 2 and words[1] == NO_VALUE:
             self._note_deaf(words[0])
         if len(words) != 2 or not words[1].isdigit():

@@ -22,11 +22,12 @@ from robot.hal.pins import Pins
 from robot.hal.protocols import Clock
 from robot.hal.robotiq import GripScale, RobotiqGripper
 from robot.hal.rtde_clock import RtdeClock
-from robot.hal.rtde_command import ALL_BITS, RATE_HZ, Readers, RtdeCommand
+from robot.hal.rtde_command import ALL_BITS, RATE_HZ, TAKE_S, Readers, RtdeCommand
 from robot.hal.rtde_links import RtdeLinks
 from robot.hal.rtde_outputs import N_OUTPUTS
+from robot.hal.rtde_probe import probe_rtde
 from robot.hal.rtde_set_up import require, status_of
-from robot.hal.ur_calls import named
+from robot.hal.ur_calls import bounded, named
 from robot.hal.ur_checks import check_facts, check_pose, check_serial
 from robot.hal.ur_primary import read_facts
 from robot.hal.ur_state import Runtime, UrStatus, check_ready, check_version, mode_of, parse_version, why_refused
@@ -113,7 +114,8 @@ class RtdeArm:
         check_version(version)
         check_facts(facts, self._arm)
         check_pose(facts)
-        with named("RTDE", self.address):
+        probe_rtde(self.address)
+        with named("RTDE", self.address), bounded(TAKE_S if self.links.when_lost is not None else None):
             self._receive = RTDEReceiveInterface(self.address, RATE_HZ, list(FIELDS))
         self._dashboard = dashboard
         self._gripper.connect(self.address)
@@ -232,7 +234,7 @@ class RtdeArm:
             return False
         if self._command.control is not None:
             with suppress(RuntimeError):
-                self._command.control.servoStop(STOP_RAD_S2)
+                self._command.control.servoStop(STOP_RAD_S2)  # taken or not: rest is looked at, and the program ended
         is_resting = self._wait_rest()
         if self.links.is_lost_now:
             return False

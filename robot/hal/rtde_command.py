@@ -6,7 +6,7 @@ reconnection, and the script acts on the registers' last values.
 """
 
 from collections.abc import Callable
-from contextlib import suppress
+from contextlib import AbstractContextManager, suppress
 from time import monotonic_ns
 from typing import TypeAlias
 
@@ -22,7 +22,7 @@ from robot.hal.rtde_outputs import N_OUTPUTS, DigitalOutputs
 from robot.hal.rtde_set_up import arm_watchdog, end_program, prove_watchdog, set_tool
 from robot.hal.ur_calls import bounded
 
-__all__ = ["ALL_BITS", "RATE_HZ", "Readers", "RtdeCommand"]
+__all__ = ["ALL_BITS", "RATE_HZ", "TAKE_S", "Readers", "RtdeCommand"]
 
 RATE_HZ = 500.0
 TAKE_S = 8.0
@@ -91,7 +91,7 @@ class RtdeCommand:
         only where a traceback keeps it alive. Until it goes its link is watched: one that was lost is kept.
 
         Returns:
-            Whether the program has ended.
+            Whether the program has ended, and no coil of a drive is left with current.
         """
         is_ended = True
         if self.control is not None:
@@ -99,8 +99,10 @@ class RtdeCommand:
             is_ended = end_program(self.control, receive, dashboard, clock)
         outputs, self.outputs = self.outputs, None
         if outputs is not None:
+            is_rested = False
             with suppress(RuntimeError):
-                outputs.put(self._pins.rested(outputs.bits))
+                is_rested = outputs.put(self._pins.rested(outputs.bits)) is None
+            is_ended = is_ended and is_rested
         if self._links.is_lost_now:
             return False
         self._links.forget()
@@ -113,15 +115,19 @@ class RtdeCommand:
         return is_ended
 
     def _connected(self) -> RTDEControlInterface:
-        with bounded(TAKE_S if self._links.when_lost is not None else None):
+        with self._in_time():
             control = RTDEControlInterface(self._address, RATE_HZ, RTDEControlInterface.FLAG_UPLOAD_SCRIPT)
         self._links.look()
         return control
 
+    def _in_time(self) -> AbstractContextManager[None]:
+        return bounded(TAKE_S if self._links.when_lost is not None else None)
+
     def _set_up(self, control: RTDEControlInterface, receive: RTDEReceiveInterface, clock: Clock) -> None:
         """Set payload and tool centre point, open the outputs, arm the watchdog last."""
         set_tool(control, receive, clock, self._tool)
-        self.outputs = DigitalOutputs(self._address, bits=receive.getActualDigitalOutputBits() & ALL_BITS)
+        with self._in_time():
+            self.outputs = DigitalOutputs(self._address, bits=receive.getActualDigitalOutputBits() & ALL_BITS)
         self._links.look()
         self._pins.forget()
         arm_watchdog(control, receive, clock)  # from here on somebody must write

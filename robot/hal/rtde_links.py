@@ -5,10 +5,9 @@ from collections.abc import Callable
 from robot.errors import StaleStateError
 from robot.hal.link_guard import LinkGuard
 from robot.hal.link_watch import LinkWatch
+from robot.hal.rtde_probe import RTDE_PORT
 
 __all__ = ["RtdeLinks"]
-
-RTDE_PORT = 30004
 
 
 class RtdeLinks:

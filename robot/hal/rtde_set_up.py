@@ -17,7 +17,10 @@ __all__ = ["arm_watchdog", "end_program", "prove_watchdog", "require", "set_tool
 WATCHDOG_HZ = 10.0
 """Commands that come less often stop the program on the controller's side."""
 PROOF_S = 0.5
-"""Time on the controller's clock in which an armed and starved watchdog must have stopped the program."""
+"""Time on the controller's clock for what is set to be seen."""
+STARVED_S = (0.06, 0.25)
+"""After so long on the controller's clock an armed and starved watchdog ends its program: 100 ms, the client's own last
+word and a state's delay. What ended it earlier was something else."""
 PROOF_WALL_S = 5.0
 PAYLOAD_TOLERANCE_KG, CENTRE_TOLERANCE_M, TCP_TOLERANCE = 0.05, 1e-4, 1e-4
 END_S = 0.5
@@ -60,18 +63,44 @@ def prove_watchdog(control: RTDEControlInterface, receive: RTDEReceiveInterface,
     """Arm the controller's watchdog, starve it, and see the program end. Nothing has moved yet.
 
     Raises:
-        ArmRefusedError: the program runs on.
+        ArmRefusedError: the program runs on, was ended by something else, or was not seen to run.
     """
+    silent_ms, (earliest_s, latest_s) = 1e3 / WATCHDOG_HZ, STARVED_S
+    deadline_ns = monotonic_ns() + round(PROOF_WALL_S * 1e9)
+    _await_playing(receive, clock, deadline_ns)
     arm_watchdog(control, receive, clock)
-    begun_s, deadline_ns = receive.getTimestamp(), monotonic_ns() + round(PROOF_WALL_S * 1e9)
-    while receive.getTimestamp() - begun_s < PROOF_S and monotonic_ns() < deadline_ns:
+    begun_s = receive.getTimestamp()
+    while (gone_s := receive.getTimestamp() - begun_s) < latest_s and monotonic_ns() < deadline_ns:
         clock.wait_tick()
-        if status_of(receive).runtime == Runtime.STOPPED:
-            return
+        status = status_of(receive)
+        if status.runtime == Runtime.PLAYING:
+            continue
+        if not is_well(status, is_ended=True):
+            raise ArmRefusedError(f"the arm was stopped while its watchdog was tried: {why_refused(status)}")
+        if status.runtime != Runtime.STOPPED:
+            continue
+        if gone_s < earliest_s:
+            raise ArmRefusedError(
+                f"expected the controller's watchdog to end the program after {silent_ms:.0f} ms of silence, something "
+                f"else did after {1e3 * gone_s:.0f} ms; look at its log"
+            )
+        return
     raise ArmRefusedError(
-        f"expected the controller's watchdog to end a program that is silent for {1e3 / WATCHDOG_HZ:.0f} ms, "
-        f"it ran on for {PROOF_S:g} s: do not move this arm"
+        f"expected the controller's watchdog to end a program that is silent for {silent_ms:.0f} ms, "
+        f"it ran on for {latest_s:g} s: do not move this arm"
     )
+
+
+def _await_playing(receive: RTDEReceiveInterface, clock: Clock, deadline_ns: int) -> None:
+    """Wait until the program is seen to run: what has not begun cannot be seen to end.
+
+    Raises:
+        ArmRefusedError: it never was.
+    """
+    while (status := status_of(receive)).runtime != Runtime.PLAYING:
+        if monotonic_ns() > deadline_ns:
+            raise ArmRefusedError(f"expected the client's program to run, came: {why_refused(status)}")
+        clock.wait_tick()
 
 
 def end_program(

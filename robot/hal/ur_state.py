@@ -35,10 +35,12 @@ _ROBOT_MODES = {
 _SAFETY_BITS = (
     (2, "protective stop"), (4, "safeguard stop"), (5, "system emergency stop"), (6, "robot emergency stop"),
     (7, "emergency stop"), (8, "safety violation"), (9, "safety fault"), (10, "stopped due to safety"), (3, "recovery"),
+    (11, "three-position enabling device released"),
 )  # fmt: skip
 _EMERGENCY = 1 << 5 | 1 << 6 | 1 << 7
 _FAULT = 1 << 8 | 1 << 9
-_SAFEGUARD = 1 << 4
+_SAFEGUARD = 1 << 4 | 1 << 11
+_REDUCED = 1 << 1
 _STOPPED = 1 << 2 | 1 << 3 | 1 << 10
 """Bit 10 stands beside that of every stop; alone it is the least that can be said."""
 
@@ -78,9 +80,9 @@ def _mode_in(status: UrStatus) -> ArmMode:
     return mode_of(status.robot_mode, status.safety_bits)
 
 
-def is_well(status: UrStatus) -> bool:
-    """Return whether nothing in a state says why the controller should not obey."""
-    return _mode_in(status) is ArmMode.RUNNING and status.runtime == Runtime.PLAYING
+def is_well(status: UrStatus, *, is_ended: bool = False) -> bool:
+    """Return whether nothing in a state says why the controller should not obey, but that its program ended perhaps."""
+    return _mode_in(status) is ArmMode.RUNNING and (is_ended or status.runtime == Runtime.PLAYING)
 
 
 def why_refused(status: UrStatus) -> str:
@@ -97,7 +99,8 @@ def check_ready(status: UrStatus, *, is_remote: bool) -> None:
     """Refuse to take an arm that is not ready, or that somebody else uses.
 
     Raises:
-        ArmRefusedError: not in remote control, not running, stopped by safety, slowed down, or a program runs.
+        ArmRefusedError: not in remote control, not running, stopped by safety, in reduced mode, slowed down, or a
+            program runs.
     """
     if not is_remote:
         raise ArmRefusedError("expected the arm in remote control, it is in local: switch it at the top right corner")
@@ -105,6 +108,11 @@ def check_ready(status: UrStatus, *, is_remote: bool) -> None:
         raise ArmRefusedError(f"expected an arm that runs and is not stopped, came: {why_refused(status)}")
     if status.runtime not in (Runtime.STOPPED, Runtime.STOPPING):
         raise ArmRefusedError("expected no program on the arm, one is running: whoever started it must stop it")
+    if status.safety_bits & _REDUCED:
+        raise ArmRefusedError(
+            "expected the arm in normal mode, it is in reduced mode, whose limits are narrower than those it was "
+            "compared with: leave that mode at the cell"
+        )
     if status.speed_fraction < FULL_SPEED:
         percent = round(100 * status.speed_fraction)
         raise ArmRefusedError(

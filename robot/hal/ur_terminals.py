@@ -12,6 +12,7 @@ from rtde_receive import RTDEReceiveInterface
 
 from robot.errors import ArmRefusedError, WireError
 from robot.hal.rtde_outputs import N_OUTPUTS, DigitalOutputs
+from robot.hal.rtde_probe import probe_rtde
 from robot.hal.ur_state import Runtime
 
 __all__ = ["UrTerminals"]
@@ -45,6 +46,7 @@ class UrTerminals:
             ArmRefusedError: a program runs on it, which would have a word in its outputs too.
         """
         try:
+            probe_rtde(self._address)
             dashboard = DashboardClient(self._address)
             dashboard.connect()
             self.serial = dashboard.getSerialNumber().strip()

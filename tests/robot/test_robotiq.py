@@ -1,5 +1,7 @@
 """The gripper's client against a server that speaks its protocol on a real socket, driven by hand."""
 
+import socket
+
 import msgspec
 import pytest
 
@@ -175,6 +177,32 @@ def test_a_fault_that_comes_and_goes_is_seen_each_time_it_is_there(bench):
         assert not bench.gripper.is_active
         bench.fingers.measured = msgspec.structs.replace(bench.fingers.measured, flt=0)
         bench.turn(until=lambda: bench.gripper.is_active)
+
+
+def poll_long(gripper):
+    for _ in range(1000):
+        gripper.poll()
+
+
+def test_a_gripper_that_does_not_take_what_it_is_told_says_so(bench):
+    server, peer = socket.create_server((HOST, 0)), None
+    try:
+        robotiq.GRIPPER_PORT = server.getsockname()[1]  # put back by the bench's own patch
+        gripper = RobotiqGripper(GripScale.of(TOOL))
+        gripper.connect(HOST)
+        peer, _ = server.accept()
+        gripper.poll()
+        assert peer.recv(256).startswith(b"GET POS")
+        gripper.command(GripCommand(opening_m=0.04, force_n=20.0, speed_m_s=0.05))
+        assert b"SET" in peer.recv(256)
+        peer.sendall(b"?\n")
+        with pytest.raises(WireError, match="does not take it"):
+            poll_long(gripper)
+        gripper.close()
+    finally:
+        server.close()
+        if peer is not None:
+            peer.close()
 
 
 def test_one_that_nobody_commands_may_be_in_any_state(bench):

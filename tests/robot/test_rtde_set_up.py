@@ -1,11 +1,13 @@
 """What is told the controller is read back, through the genuine client."""
 
+import math
+
 import msgspec
 import pytest
 
 from config.loader import load_arm
 from robot.errors import ArmRefusedError
-from robot.hal.rtde_set_up import set_tool
+from robot.hal.rtde_set_up import prove_watchdog, set_tool
 from tests.support.loopback import own_address
 
 pytest.importorskip("rtde_control", reason="the genuine client comes with `pip install autotelic[lab]`")
@@ -47,3 +49,61 @@ def test_a_tool_whose_centre_is_read_back_is_set(station, off_m):
 def test_another_centre_of_mass_than_asked_is_refused(station):
     with pytest.raises(ArmRefusedError, match="m of the flange, the controller says"):
         set_tool(OffCentre(station.control, 2e-4), station.receive, Ticks(), load_arm("ur5e").tool)
+
+
+class Told:
+    """What a controller says of itself, tick by tick of 2 ms, after its watchdog was armed."""
+
+    PROTECTIVE = 1 << 2
+
+    def __init__(self, *, stops_after_s, begins_after_s=0.0, safety=1):
+        self._stops_s, self._begins_s, self._safety = stops_after_s, begins_after_s, safety
+        self.now_s, self.armed_s = 0.0, math.inf
+
+    def setWatchdog(self, hz):  # noqa: N802 - the client's name
+        assert hz == 10.0
+        self.armed_s = self.now_s
+        return True
+
+    def getTimestamp(self):  # noqa: N802
+        return self.now_s
+
+    def getRobotMode(self):  # noqa: N802
+        return 7
+
+    def getSafetyStatusBits(self):  # noqa: N802
+        return self._safety if self._has_stopped else 1
+
+    def getRuntimeState(self):  # noqa: N802
+        return 1 if self._has_stopped or self.now_s < self._begins_s else 2
+
+    def getTargetSpeedFraction(self):  # noqa: N802
+        return 1.0
+
+    def wait_tick(self):
+        self.now_s += 0.002
+
+    @property
+    def _has_stopped(self):
+        return self.now_s - self.armed_s >= self._stops_s
+
+
+@pytest.mark.parametrize("begins_after_s", [0.0, 0.3])
+def test_a_watchdog_that_ends_a_running_program_in_its_time_is_proven(begins_after_s):
+    told = Told(stops_after_s=0.102, begins_after_s=begins_after_s)
+    prove_watchdog(told, told, told)
+    assert told.armed_s >= begins_after_s
+    assert told.now_s - told.armed_s == pytest.approx(0.102, abs=0.003)
+
+
+@pytest.mark.parametrize(
+    ("told", "why"),
+    [
+        (Told(stops_after_s=0.002), "something else did after"),
+        (Told(stops_after_s=0.46), "it ran on for 0.25 s"),
+        (Told(stops_after_s=0.1, safety=Told.PROTECTIVE), "protective stop"),
+    ],
+)
+def test_an_end_that_the_watchdog_did_not_make_proves_nothing(told, why):
+    with pytest.raises(ArmRefusedError, match=why):
+        prove_watchdog(told, told, told)

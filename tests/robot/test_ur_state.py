@@ -33,6 +33,7 @@ def but(**changes):
         (but(safety_bits=1 << 2 | 1 << 10), ArmMode.PROTECTIVE_STOP),
         (but(safety_bits=1 << 10), ArmMode.PROTECTIVE_STOP),
         (but(safety_bits=1 << 4 | 1 << 10), ArmMode.SAFEGUARD_STOP),
+        (but(safety_bits=1 << 11), ArmMode.SAFEGUARD_STOP),
         (but(safety_bits=1 << 2 | 1 << 4 | 1 << 10), ArmMode.SAFEGUARD_STOP),
         (but(safety_bits=1 << 9 | 1 << 10), ArmMode.SAFETY_FAULT),
         (but(safety_bits=1 << 8 | 1 << 4), ArmMode.SAFETY_FAULT),
@@ -50,6 +51,7 @@ def test_the_gravest_of_what_it_says_is_its_mode(status, mode):
     [
         (but(safety_bits=1 << 2), "protective stop"),
         (but(safety_bits=1 << 4), "safeguard"),
+        (but(safety_bits=1 << 11), "three-position"),
         (but(safety_bits=1 << 6 | 1 << 7), "emergency"),
         (but(robot_mode=5), "brakes"),
         (but(runtime=Runtime.STOPPED), "program on the controller has ended"),
@@ -73,6 +75,7 @@ def test_an_arm_that_is_ready_is_taken():
         (but(runtime=Runtime.PLAYING), True, "whoever started it"),
         (but(runtime=Runtime.PAUSED), True, "whoever started it"),
         (but(speed_fraction=0.5), True, "50 %"),
+        (but(safety_bits=0b10), True, "reduced mode"),
     ],
 )
 def test_an_arm_that_is_not_ready_or_somebody_elses_is_not_taken(status, is_remote, word):
