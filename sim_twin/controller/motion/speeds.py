@@ -13,6 +13,8 @@ __all__ = ["Speeds"]
 
 Numbers = Sequence[float] | Array
 REACHED = 1e-9
+PAUSE_RAD_S2, PAUSE_M_S2 = 10.0, 4.0
+"""A pause slows down at least so hard, however gentle the acceleration that the program asked for."""
 
 
 class Speeds:
@@ -90,6 +92,7 @@ class Speeds:
                 return
 
     def _joints(self, speed: Array, goal: Array, a: float) -> Array:
+        a = max(a, PAUSE_RAD_S2) if self._core.pace.is_paused else a
         change = goal - speed
         largest = float(np.abs(change).max())
         self._is_reached = largest <= a * SLICE_S
@@ -97,6 +100,7 @@ class Speeds:
 
     def _tool(self, speed: Array, goal: Array, a: float) -> Array:
         core = self._core
+        a = max(a, PAUSE_M_S2) if core.pace.is_paused else a
         J = core.kinematics.jacobian(core.nominal_rad, core.T_ft)
         twist = J @ speed
         change = goal - twist
