@@ -80,6 +80,7 @@ class MotionCore:
         kinematics: The arm's.
         setpoint: Where it is asked to be.
         speed_rad_s: Greatest speed of each joint.
+        acceleration_rad_s2: Greatest acceleration of each joint that a move or speedj uses.
         servo_lag_s: How far the servo behind the set-point trails a ramp.
         dead_time_s: The dead time in the lag's law.
     """
@@ -90,11 +91,12 @@ class MotionCore:
         kinematics: ArmKinematics,
         setpoint: SetPoint,
         speed_rad_s: Array,
+        acceleration_rad_s2: Array,
         servo_lag_s: float,
         dead_time_s: float,
     ) -> None:
         self.kinematics, self.setpoint = kinematics, setpoint
-        self.speed_rad_s = speed_rad_s
+        self.speed_rad_s, self.acceleration_rad_s2 = speed_rad_s, acceleration_rad_s2
         self.servo_lag_s, self.dead_time_s = servo_lag_s, dead_time_s
         self.pace = Pace()
         self.T_ft = np.eye(4)

@@ -31,10 +31,12 @@ class Speeds:
         self._core = core
 
     def speedj(self, qd: Numbers, a: float = 1.4, t: float = 0.0) -> Motion:
-        """Approach joint speeds, the joint with most to change at a."""
+        """Approach joint speeds, the joint with most to change at a; all in proportion, as fast as the arm may."""
         goal = vec6(qd, "joint speeds")
         _check_positive(a)
-        return self._approach(self._joints, goal, a, t)
+        core = self._core
+        goal = goal * min(1.0, float(np.min(core.speed_rad_s / np.maximum(np.abs(goal), core.speed_rad_s))))
+        return self._approach(self._joints, goal, min(a, float(core.acceleration_rad_s2.min())), t)
 
     def speedl(self, xd: Numbers, a: float = 1.2, t: float = 0.0) -> Motion:
         """Approach a tool speed (v, w) in base axes, its translation at a.
