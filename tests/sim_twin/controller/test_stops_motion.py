@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from sim_twin.controller.states import Event, RobotMode, RuntimeState, SafetyMode
+from sim_twin.controller.states import Event, PowerTimes, RobotMode, RuntimeState, SafetyMode
 from sim_twin.controller.wire import ControllerVersion
 from tests.support.virtual_robot import run, started, state_of
 
@@ -47,6 +47,11 @@ ONTO = {
     "violation": (lambda robot: robot.programs.handle(Event.VIOLATION), STOPPED),
 }
 N_TO_REST = 260
+HAPPENINGS = (
+    *(Event.SAFEGUARD_OPENED, Event.SAFEGUARD_CLOSED, Event.PLAY) * 2,
+    *(Event.PAUSE, Event.STOP, Event.PROTECTIVE_STOP, Event.UNLOCK_PROTECTIVE_STOP),
+    *("def", "sec"),
+)
 
 
 def moving(motion, n=90):
@@ -128,3 +133,36 @@ def test_a_path_is_gone_on_with_where_a_safeguard_held_it_up():
     run(robot, 1000, lambda: state_of(robot) is STOPPED)
     assert robot.machine.world.data.qpos[0] - held > 0.5
     assert robot.machine.modes.safety is SafetyMode.NORMAL
+
+
+def happen(robot, what, text):
+    """Let one thing happen; what nobody can play is sent again."""
+    if what == "sec":
+        robot.submit_script("sec side():\n speedj([0.5,0,0,0,0,0], 1, 1)\nend\n")
+    elif what == "def" or (what is Event.PLAY and state_of(robot) is STOPPED):
+        robot.submit_script(text)
+    elif what is Event.STOP:
+        robot.programs.stop()
+    else:
+        robot.programs.handle(what)
+
+
+@pytest.mark.parametrize("seed", [*range(12), *(pytest.param(k, marks=pytest.mark.slow) for k in range(12, 150))])
+def test_whatever_happens_in_whatever_order_the_arm_rests_under_a_stop(seed):
+    draw = np.random.default_rng(seed)
+    motion = sorted(MOTIONS)[draw.integers(len(MOTIONS))]
+    robot = moving(motion, int(draw.integers(60, 120)))
+    modes, core = robot.machine.modes, robot.machine.drive.core
+    modes.times = PowerTimes(n_before_unlock=100)
+    n_pausing = n_quiet = 0
+    for _ in range(draw.integers(3, 9)):
+        happen(robot, HAPPENINGS[draw.integers(len(HAPPENINGS))], f"def moves():\n {MOTIONS[motion]}\nend\n")
+        for _ in range(draw.choice((1, 3, 20, 80, 200, 350))):
+            robot.step()
+            state = state_of(robot)
+            n_pausing = n_pausing + 1 if state is RuntimeState.PAUSING else 0
+            n_quiet = n_quiet + 1 if modes.is_stopped_by_safety or state in (PAUSED, STOPPED) else 0
+            assert n_pausing < N_TO_REST
+            if n_quiet > N_TO_REST:
+                assert float(np.abs(robot.machine.world.data.qvel[:6]).max()) < STILL_RAD_S
+                assert (core.force_task, core.is_free) == (None, False)
