@@ -83,7 +83,8 @@ _COMMANDS: dict[Event, tuple[_Command, ...]] = {
     Event.PLAY: (
         _Command(
             modes=(RobotMode.RUNNING,), runtimes=(RuntimeState.STOPPED,), forbidden_by=_STOPS,
-            to_runtime=RuntimeState.PLAYING, reaction=Reaction(program=ProgramOrder.START),
+            to_runtime=RuntimeState.PLAYING,
+            reaction=Reaction(motion=MotionOrder.RESUME, program=ProgramOrder.START),
         ),
         _Command(
             modes=(RobotMode.RUNNING,), runtimes=(RuntimeState.PAUSED,), forbidden_by=_STOPS,
@@ -229,6 +230,8 @@ class Modes:
             self.runtime = _AFTER_STANDING.get(self.runtime, self.runtime)
         if self.runtime is RuntimeState.RESUMING:
             self.runtime = RuntimeState.PLAYING
+        elif self._was_playing and self.runtime is RuntimeState.PAUSED and not self.is_stopped_by_safety:
+            return self._resume()
         if self._due is not None and self._n_slices >= self._due:
             return self._come_up()
         return _NONE
@@ -244,6 +247,9 @@ class Modes:
         if condition is Condition.SAFEGUARD:
             self._is_guard_open = True
             self._was_playing |= self.runtime in (RuntimeState.PLAYING, RuntimeState.RESUMING)
+        elif condition in _STOPS:
+            # Only a person goes on after any other stop, whatever it was that paused the program first.
+            self._was_playing = False
         if reaction.category is StopCategory.CUT:
             self._power_off()
         elif reaction.category is StopCategory.STOP_THEN_CUT and self.robot is not RobotMode.POWER_OFF:
@@ -266,6 +272,8 @@ class Modes:
         return self._lose_power() if condition in _ESTOPS and self._cut_at is not None else _NONE
 
     def _command(self, event: Event) -> Reaction:
+        if event in (Event.PAUSE, Event.STOP):
+            self._was_playing = False
         rows = _COMMANDS[event]
         row = next((r for r in rows if self.robot in r.modes and self.runtime in r.runtimes), None)
         if row is None:
@@ -326,12 +334,17 @@ class Modes:
         return self._clear_guard()
 
     def _clear_guard(self) -> Reaction:
+        """Go on where the safeguard alone paused a program; one that is still slowing down comes to rest first."""
         self._conditions.discard(Condition.SAFEGUARD)
-        was_playing, self._was_playing = self._was_playing, False
-        if not was_playing or self.is_stopped_by_safety or self.robot is not RobotMode.RUNNING:
+        if self.runtime in (RuntimeState.STOPPED, RuntimeState.STOPPING):
+            self._was_playing = False
+            return Reaction(motion=MotionOrder.RESUME)
+        if not self._was_playing or self.is_stopped_by_safety or self.runtime is not RuntimeState.PAUSED:
             return _NONE
-        if self.runtime not in (RuntimeState.PAUSED, RuntimeState.PAUSING):
-            return _NONE
+        return self._resume()
+
+    def _resume(self) -> Reaction:
+        self._was_playing = False
         self.runtime = RuntimeState.RESUMING
         return Reaction(motion=MotionOrder.RESUME, program=ProgramOrder.RESUME)
 

@@ -101,6 +101,8 @@ class VirtualRobot:
         machine.io.apply()
         self._watch()
         self.programs.step()
+        if not machine.modes.may_move:
+            drive.stiffen()
         machine.world.digital_out = self.box.drive(machine.io.digital_out)
         breach = drive.tick()
         if self.disturb is not None:

@@ -101,7 +101,7 @@ class MotionOrder(Enum):
     STOP = auto()
     """Slow down as fast as the arm may, off the path if need be, and hold."""
     PAUSE = auto()
-    """Slow down on the path and hold."""
+    """Slow down on the path and hold; what knows no path is braked, what complies ends."""
     RESUME = auto()
     """Go on along the path."""
     ENGAGE = auto()

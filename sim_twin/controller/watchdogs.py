@@ -16,10 +16,18 @@ class WatchdogAction(Enum):
     STOP = "stop"
 
 
+_STRICTEST_FIRST = (WatchdogAction.STOP, WatchdogAction.PAUSE)
+
+
 class _Watchdog:
     def __init__(self, n_slices: int, action: WatchdogAction) -> None:
         self.n_slices, self.action = n_slices, action
         self.n_waited = 0
+
+    @property
+    def is_starved(self) -> bool:
+        """Its time has run out."""
+        return self.n_waited > self.n_slices
 
 
 class Watchdogs:
@@ -45,13 +53,19 @@ class Watchdogs:
             watched.n_waited = 0
 
     def tick(self) -> tuple[str, WatchdogAction] | None:
-        """Let one slice pass; return the variable whose time ran out in it, and what to do."""
-        starved = None
-        for name, watched in self._watched.items():
+        """Let one slice pass; return a variable whose time ran out, and what to do: the strictest of what is due.
+
+        What is returned gets its time anew, and is due again if nobody writes; what gives way stays due.
+        """
+        for watched in self._watched.values():
             watched.n_waited += 1
-            if watched.n_waited == watched.n_slices + 1 and watched.action is not WatchdogAction.IGNORE:
-                starved = name, watched.action
-        return starved
+        for action in _STRICTEST_FIRST:
+            due = {name: w for name, w in self._watched.items() if w.action is action and w.is_starved}
+            if due:
+                for watched in due.values():
+                    watched.n_waited = 0
+                return next(iter(due)), action
+        return None
 
     def clear(self) -> None:
         """Forget all: the program ended."""

@@ -80,6 +80,7 @@ class MotionCore:
         kinematics: The arm's.
         setpoint: Where it is asked to be.
         speed_rad_s: Greatest speed of each joint.
+        acceleration_rad_s2: Greatest acceleration of each joint that a move or speedj uses.
         servo_lag_s: How far the servo behind the set-point trails a ramp.
         dead_time_s: The dead time in the lag's law.
     """
@@ -90,11 +91,12 @@ class MotionCore:
         kinematics: ArmKinematics,
         setpoint: SetPoint,
         speed_rad_s: Array,
+        acceleration_rad_s2: Array,
         servo_lag_s: float,
         dead_time_s: float,
     ) -> None:
         self.kinematics, self.setpoint = kinematics, setpoint
-        self.speed_rad_s = speed_rad_s
+        self.speed_rad_s, self.acceleration_rad_s2 = speed_rad_s, acceleration_rad_s2
         self.servo_lag_s, self.dead_time_s = servo_lag_s, dead_time_s
         self.pace = Pace()
         self.T_ft = np.eye(4)
@@ -199,7 +201,8 @@ class MotionCore:
     def _complied(self, law: ForceLaw, sensed: Sensed) -> Array:
         q = self.setpoint.q_target
         T_bt, J = self.kinematics.forward_and_jacobian(q, self.T_ft)
-        twist = law.twist(J @ self.nominal_speed_rad_s, sensed.wrench, T_bt[:3, 3])
+        nominal = J @ self.nominal_speed_rad_s
+        twist = law.twist(nominal, sensed.wrench, T_bt[:3, 3], is_ending=self.pace.is_paused)
         return q + joint_speeds_of(J, twist) * SLICE_S
 
     def _followed(self, sensed: Sensed, free: Array) -> Array:
@@ -299,6 +302,15 @@ class MotionCore:
         self._is_driven = self._was_driven = False
         self._seat()
 
+    def catch(self, q_rad: Array, qd_rad_s: Array) -> None:
+        """Take joints over that move by themselves; brake, unless a motion has begun in this slice.  (6,), (6,)"""
+        is_driven = self._is_driven
+        self.hold(q_rad)
+        self.setpoint.place(q_rad, qd_rad_s)
+        self._seat()
+        if not is_driven:
+            self.begin_stop()
+
     def _stopping(self, speed: Array) -> Motion:
         stop_s = float((np.abs(speed) / STOP_RAD_S2).max())
         left, q = stop_s, self.setpoint.q_target
@@ -320,7 +332,9 @@ class MotionCore:
     # --------------------------------------------------------------------------------------- force mode, freedrive
 
     def force_mode(self, task: ForceTask) -> None:
-        """Comply from this slice on; a running force mode takes the new task."""
+        """Comply from this slice on; a running force mode takes the new task. Without effect while paused."""
+        if self.pace.is_paused:
+            return
         self._law = ForceLaw(task, dt_s=SLICE_S, before=self._law)
 
     def end_force_mode(self) -> None:
@@ -337,13 +351,23 @@ class MotionCore:
         return None if self._law is None else self._law.task
 
     def freedrive(self, free_axes: Sequence[float] = (1, 1, 1, 1, 1, 1)) -> None:
-        """Let the joints be led by hand; axes that are not free (base axes at the tool) are held."""
+        """Let the joints be led by hand; axes that are not free (base axes at the tool) are held.
+
+        Without effect while paused.
+        """
+        if self.pace.is_paused:
+            return
         self.tail = None
         self._free_axes = np.array(free_axes, dtype=bool)
 
     def end_freedrive(self) -> None:
         """Hold where the arm was led to."""
         self._free_axes = None
+
+    def stiffen(self) -> None:
+        """End force mode and freedrive; the arm is held."""
+        self.end_force_mode()
+        self.end_freedrive()
 
     @property
     def is_free(self) -> bool:

@@ -150,12 +150,20 @@ class TwinDrive:
     def put_torque(self, torque_nm: Sequence[float] | Array) -> None:
         """Move the joints by torques in this slice, beside what carries their weight; afterwards they are held.  (6,)
 
+        Without effect while paused.
+
         Raises:
             ValueError: they are not six finite numbers.
         """
         torque = vec6(torque_nm, "joint torques")
         greatest = np.array([j.torque_nm for j in self.world.arm.joints])
-        self._torque_nm = np.clip(torque, -greatest, greatest)
+        if not self.core.pace.is_paused:
+            self._torque_nm = np.clip(torque, -greatest, greatest)
+
+    def stiffen(self) -> None:
+        """Let nothing comply nor be led, nor torques move the joints: no program may move."""
+        self._torque_nm = None
+        self.core.stiffen()
 
     def _cut_servos(self) -> None:
         model = self.world.model
@@ -169,12 +177,16 @@ class TwinDrive:
         model.actuator_biasprm[self._controls] = self._biases
         self._is_compliant = False
 
-    def _seat(self) -> None:
+    def _seat(self, moving_rad_s: Array | None = None) -> None:
+        """Hold the joints where they are; joints that move are braked."""
         self._felt_force_n, self._felt_nm = 0.0, np.zeros(6)
         q = self.world.data.qpos[:6].copy()
         self.world.data.ctrl[self._controls] = q
         self._expected = q
-        self.core.hold(q)
+        if moving_rad_s is None:
+            self.core.hold(q)
+        else:
+            self.core.catch(q, moving_rad_s)
 
     # ------------------------------------------------------------------------------------------------------ sensing
 
@@ -231,7 +243,7 @@ class TwinDrive:
         torque_nm, self._torque_nm = None if self.is_braked else self._torque_nm, None
         if torque_nm is None and self._is_compliant:
             self._give_servos()
-            self._seat()
+            self._seat(data.qvel[:6].copy())
         breach = None if self.is_braked or torque_nm is not None else self._drive()
         if self.is_braked:
             data.ctrl[self._controls] = data.qpos[:6]
@@ -263,13 +275,19 @@ class TwinDrive:
         if is_cut:
             self.lock()
         elif not self.is_braked:
+            self._torque_nm = None
             self.core.begin_stop()
 
     def obey(self, order: MotionOrder) -> None:
         """Do what the modes' reaction asks of the motion."""
         pace = self.core.pace
         pace.is_paused = order is MotionOrder.PAUSE or (pace.is_paused and order is MotionOrder.NONE)
-        if order is MotionOrder.CUT:
+        if order is MotionOrder.PAUSE:
+            # Force mode slows down first: it ends when the arm rests, freedrive at once.
+            self.core.end_freedrive()
+        elif order is MotionOrder.RESUME:
+            self.core.stiffen()
+        elif order is MotionOrder.CUT:
             self.lock()
         elif order is MotionOrder.STOP:
             self.stop()

@@ -7,13 +7,15 @@ from enum import IntEnum
 import msgspec
 import numpy as np
 
-from sim_twin.controller.motion.poses import Array, matrix_from_pose
+from sim_twin.controller.motion.poses import Array, length, matrix_from_pose
 
 __all__ = ["ForceKind", "ForceLaw", "ForceTask", "task_axes"]
 
 SPEED_PER_FORCE = (0.0006, 0.0006, 0.0006, 0.03, 0.03, 0.03)
 """m/s per N and rad/s per Nm at gain scaling 1: slow enough for the fingertips' 8 N/mm behind 35 ms of lag."""
 SMOOTHING_S = 0.012
+BRAKE = (2.5, 10.0)
+"""m/s² and rad/s² at which complying ends when the program is paused."""
 STILL = 1e-4
 
 
@@ -81,30 +83,39 @@ class ForceLaw:
 
     def __init__(self, task: ForceTask, *, dt_s: float, before: "ForceLaw | None" = None) -> None:
         self.task = task
+        self._dt_s = dt_s
         self._share = 1.0 - math.exp(-dt_s / SMOOTHING_S)
-        self._speed = np.zeros(6) if before is None else before._speed
+        self._speed: Array = np.zeros(6) if before is None else before._speed
         self._free = np.array(task.is_compliant, dtype=bool)
         self._gain = np.array(SPEED_PER_FORCE) * task.gain_scaling
         self._wrench, self._limits = np.array(task.wrench), np.abs(task.limits)
 
-    def twist(self, nominal: Array, felt: Sequence[float] | Array, tool_m: Array) -> Array:
+    def twist(self, nominal: Array, felt: Sequence[float] | Array, tool_m: Array, *, is_ending: bool = False) -> Array:
         """Return the tool's speed in base axes: compliant along some axes, as the program has it along the others.
 
         Args:
             nominal: The program's own tool speed (v, w), base axes.  (6,)
             felt: Force and torque of the world on the tool, at the tool, base axes.  (6,)
             tool_m: Where the tool is.  (3,)
+            is_ending: Come to rest along the compliant axes, whatever is felt.
 
         Returns:
             (v, w), base axes.  (6,)
         """
         R = task_axes(self.task, tool_m, nominal[:3])
         program, measured = _turned(R.T, nominal), _turned(R.T, np.asarray(felt))
-        wanted = self._gain * (self._wrench + measured)
-        self._speed += self._share * (wanted - self._speed)
+        if is_ending:
+            self._brake()
+        else:
+            wanted = self._gain * (self._wrench + measured)
+            self._speed += self._share * (wanted - self._speed)
         self._speed = np.clip(self._speed, -self._limits, self._limits)
         self._speed[~self._free] = 0.0
         return _turned(R, np.where(self._free, self._speed * (1.0 - self.task.damping), program))
+
+    def _brake(self) -> None:
+        left_s = max(length(self._speed[:3]) / BRAKE[0], length(self._speed[3:]) / BRAKE[1])
+        self._speed *= max(0.0, 1.0 - self._dt_s / left_s) if left_s else 0.0
 
 
 def _turned(R: Array, pair: Array) -> Array:

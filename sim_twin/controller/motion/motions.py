@@ -37,6 +37,7 @@ class Motions:
             kinematics=kinematics,
             setpoint=self.setpoint,
             speed_rad_s=np.array([j.speed_rad_s for j in arm.joints]),
+            acceleration_rad_s2=np.array([j.acceleration_rad_s2 for j in arm.joints]),
             servo_lag_s=servo_lag_s,
             dead_time_s=arm.servo.dead_time_s,
         )

@@ -1,5 +1,6 @@
 """movej, movel, movep, movec and servoc: paths with trapezoidal speed and blends."""
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -12,6 +13,9 @@ from sim_twin.controller.motion.profiles import Residual, Trapezoid
 __all__ = ["Moves"]
 
 Numbers = Sequence[float] | Array
+TOOL_M_S = 3.0
+"""Greatest speed of the tool: what UR's clients take for it, and where the default safety limit is."""
+NO_RATE = 1e-9
 
 
 class Moves:
@@ -19,6 +23,10 @@ class Moves:
 
     A move with a blend radius returns as soon as the tool is within it; what is left goes on as a tail, and the next
     move, begun in that same slice, blends. Half of the move's own length is the most that a radius counts for.
+
+    No joint is sent faster or accelerated harder than the arm's file allows, nor the tool faster than its limit,
+    whatever speed, acceleration or time a move is given: it takes longer then. What a tool's path asks of the joints is
+    sampled along it.
 
     Args:
         core: What motions share.
@@ -96,7 +104,8 @@ class Moves:
         self, path: Path, vat: tuple[float, float, float], residual: Residual | None, start: Array, r: float
     ) -> Motion:
         core = self._core
-        following = core.follow(path, _profile(path.length, vat, residual), residual)
+        profile = _profile(path.length, vat, residual, self._most(path))
+        following = core.follow(path, profile, residual)
         if r <= 0.0:
             yield from following
             return
@@ -108,19 +117,35 @@ class Moves:
                 core.tail = Tail(following, anchor_rad=path.end_rad)
                 return
 
+    def _most(self, path: Path) -> tuple[float, float]:
+        """Return the greatest speed and acceleration along a path, in the unit of its length."""
+        core = self._core
+        rates = np.maximum(path.rates, NO_RATE)
+        v, a = float(np.min(core.speed_rad_s / rates)), float(np.min(core.acceleration_rad_s2 / rates))
+        return (v if isinstance(path, JointPath) else min(v, TOOL_M_S)), a
+
     def _tool_ramp_s(self, speed: Array, a: float) -> float:
         twist = self._core.kinematics.jacobian(self._core.setpoint.q_target, self._core.T_ft) @ speed
         return max(float(np.linalg.norm(twist[:3])), TURN_M_PER_RAD * float(np.linalg.norm(twist[3:]))) / a
 
 
 def _check(a: float, v: float) -> None:
-    if not (a > 0.0 and v > 0.0):
-        raise ValueError(f"move: expected acceleration and speed above 0, got a {a} and v {v}; nothing has moved")
+    if not (0.0 < a < math.inf and 0.0 < v < math.inf):
+        raise ValueError(
+            f"move: expected finite acceleration and speed above 0, got a {a} and v {v}; nothing has moved"
+        )
 
 
-def _profile(length: float, vat: tuple[float, float, float], residual: Residual | None) -> Trapezoid:
+def _profile(
+    length: float, vat: tuple[float, float, float], residual: Residual | None, most: tuple[float, float]
+) -> Trapezoid:
     """Return the speed along a path; while a residual runs out no more speed comes in than goes out."""
     v, a, t = vat
+    v, a = min(v, most[0]), min(a, most[1])
     if residual is not None:
         a = min(a, v / residual.duration_s)
-    return Trapezoid(length, v=v, a=a, duration_s=t)
+    profile = Trapezoid(length, v=v, a=a, duration_s=t)
+    if profile.v <= most[0] and profile.a <= most[1]:
+        return profile
+    v, a = most
+    return Trapezoid(length, v=v, a=a if residual is None else min(a, v / residual.duration_s))

@@ -28,6 +28,8 @@ class Path(Protocol):
     """In the unit that its speed is given in."""
     end_rad: Array
     """The joints that it leads to."""
+    rates: Array
+    """How far each joint turns at most, in a unit of its length."""
 
     def at(self, s: float) -> Array:
         """Return the joints at a distance from its start; distances must not jump.  () -> (6,)"""
@@ -51,6 +53,7 @@ class JointPath:
         self._start, self.end_rad = start_rad, end_rad
         self.length = float(np.abs(end_rad - start_rad).max())
         self._rates = (end_rad - start_rad) / self.length if self.length else np.zeros(6)
+        self.rates: Array = np.abs(self._rates)
 
     def at(self, s: float) -> Array:
         """Return the joints at a turn of the leading joint.  () -> (6,)"""
@@ -132,6 +135,7 @@ class TrackedPath:
         self.length = path.length
         self._path, self._kinematics, self._T_ft = path, kinematics, T_ft
         self._last = start_rad
+        self.rates: Array = np.zeros(6)
         self.end_rad = self._walk() if path.length else start_rad
         self._last = start_rad
 
@@ -144,7 +148,9 @@ class TrackedPath:
     def _walk(self) -> Array:
         n = max(4, min(self.N_CHECKS, math.ceil(self.length / CHECK_M)))
         for k in range(1, n + 1):
-            self.at(self.length * k / n)
+            before = self._last
+            turned = np.abs(self.at(self.length * k / n) - before)
+            self.rates = np.maximum(self.rates, turned * n / self.length)
         return self._last
 
 

@@ -24,10 +24,11 @@ class SetPoint:
     def __init__(self, q_rad: Array) -> None:
         self.place(q_rad)
 
-    def place(self, q_rad: Array) -> None:
-        """Put the set-point somewhere, at rest; what it did before is forgotten.  (6,)"""
+    def place(self, q_rad: Array, qd_rad_s: Array | None = None) -> None:
+        """Put the set-point somewhere, at rest or at a speed; what it did before is forgotten.  (6,), (6,)"""
         self.q_target = np.array(q_rad, dtype=np.float64)
-        self.qd_target, self.qdd_target = np.zeros(6), np.zeros(6)
+        self.qd_target = np.zeros(6) if qd_rad_s is None else np.array(qd_rad_s, dtype=np.float64)
+        self.qdd_target = np.zeros(6)
         self._before = (self.q_target, self.qd_target)
 
     def move(self, q_rad: Array) -> None:

@@ -13,6 +13,8 @@ __all__ = ["Speeds"]
 
 Numbers = Sequence[float] | Array
 REACHED = 1e-9
+PAUSE_RAD_S2, PAUSE_M_S2 = 10.0, 4.0
+"""A pause slows down at least so hard, however gentle the acceleration that the program asked for."""
 
 
 class Speeds:
@@ -29,10 +31,12 @@ class Speeds:
         self._core = core
 
     def speedj(self, qd: Numbers, a: float = 1.4, t: float = 0.0) -> Motion:
-        """Approach joint speeds, the joint with most to change at a."""
+        """Approach joint speeds, the joint with most to change at a; all in proportion, as fast as the arm may."""
         goal = vec6(qd, "joint speeds")
         _check_positive(a)
-        return self._approach(self._joints, goal, a, t)
+        core = self._core
+        goal = goal * min(1.0, float(np.min(core.speed_rad_s / np.maximum(np.abs(goal), core.speed_rad_s))))
+        return self._approach(self._joints, goal, min(a, float(core.acceleration_rad_s2.min())), t)
 
     def speedl(self, xd: Numbers, a: float = 1.2, t: float = 0.0) -> Motion:
         """Approach a tool speed (v, w) in base axes, its translation at a.
@@ -90,6 +94,7 @@ class Speeds:
                 return
 
     def _joints(self, speed: Array, goal: Array, a: float) -> Array:
+        a = max(a, PAUSE_RAD_S2) if self._core.pace.is_paused else a
         change = goal - speed
         largest = float(np.abs(change).max())
         self._is_reached = largest <= a * SLICE_S
@@ -97,6 +102,7 @@ class Speeds:
 
     def _tool(self, speed: Array, goal: Array, a: float) -> Array:
         core = self._core
+        a = max(a, PAUSE_M_S2) if core.pace.is_paused else a
         J = core.kinematics.jacobian(core.nominal_rad, core.T_ft)
         twist = J @ speed
         change = goal - twist

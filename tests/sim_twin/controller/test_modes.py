@@ -255,6 +255,36 @@ def test_a_safeguard_does_not_resume_through_a_protective_stop():
     assert modes.runtime is PAUSED
 
 
+@pytest.mark.parametrize("between", [Event.PAUSE, Event.PROTECTIVE_STOP])
+def test_a_safeguard_resumes_nothing_that_something_else_paused_meanwhile(between):
+    modes = after(Event.SAFEGUARD_OPENED, between)
+    tick(modes, 2500)
+    modes.handle(Event.UNLOCK_PROTECTIVE_STOP)
+    assert modes.handle(Event.SAFEGUARD_CLOSED).program is ProgramOrder.NONE
+    assert tick(modes, 5).program is ProgramOrder.NONE
+    assert modes.runtime is PAUSED
+
+
+def test_a_safeguard_that_closes_while_the_arm_slows_down_resumes_once_it_rests():
+    modes = playing()
+    modes.handle(Event.SAFEGUARD_OPENED)
+    tick(modes, 5, is_standing=False)
+    assert modes.handle(Event.SAFEGUARD_CLOSED) == Reaction()
+    tick(modes, 5, is_standing=False)
+    assert modes.runtime is RuntimeState.PAUSING
+    assert tick(modes).program is ProgramOrder.RESUME
+    assert modes.runtime is RuntimeState.RESUMING
+
+
+def test_a_safeguard_that_closes_while_no_program_runs_lets_motion_go_on():
+    modes = running()
+    modes.handle(Event.SAFEGUARD_OPENED)
+    tick(modes, 5)
+    reaction = modes.handle(Event.SAFEGUARD_CLOSED)
+    assert (reaction.motion, reaction.program) == (MotionOrder.RESUME, ProgramOrder.NONE)
+    assert modes.handle(Event.PLAY).motion is MotionOrder.RESUME
+
+
 def test_an_emergency_stop_cuts_when_the_arm_stands_or_after_its_time():
     modes = playing()
     modes.handle(Event.ROBOT_ESTOP)
