@@ -8,6 +8,7 @@ from typing import Protocol, TypeAlias
 
 import msgspec
 
+from sim_twin.controller.builtins.costs import COSTS
 from sim_twin.controller.motion import SLICE_S
 from sim_twin.controller.script import Builtins, Interpreter, ScriptNameError, ScriptSyntaxError, parse_program
 from sim_twin.controller.script.builtins import Sockets
@@ -95,7 +96,7 @@ def compile_text(text: str, make_builtins: MakeBuiltins) -> Compiled | Mistake:
     try:
         program = parse_program(text)
         sockets = Sockets(slice_s=SLICE_S)
-        interpreter = Interpreter(program, make_builtins(sockets))
+        interpreter = Interpreter(program, make_builtins(sockets), costs=COSTS)
     except (ScriptSyntaxError, ScriptNameError) as error:
         return Mistake(message=str(error), as_reported=error.as_reported, line=error.line, column=error.column)
     except RecursionError:

@@ -41,9 +41,10 @@ class ScriptRun:
         self,
         text: str,
         *,
-        slice_budget: int = 2000,
+        slice_budget: int = 20_000,
         variables: Mapping[str, Value] | None = None,
         log: Log | None = None,
+        costs: Mapping[str, int] | None = None,
         **builtins: Builtin,
     ) -> None:
         self.notes: list[object] = []
@@ -53,7 +54,7 @@ class ScriptRun:
         offered = {**PURE, **time_builtins(slice_s=SLICE_S), **message_builtins(self.log)}
         offered |= {"note": self._note, "move": self._move, "fail": self._fail, **builtins}
         program = parse_program(text)
-        self.interpreter = Interpreter(program, offered, slice_budget=slice_budget, variables=variables)
+        self.interpreter = Interpreter(program, offered, slice_budget=slice_budget, variables=variables, costs=costs)
 
     def step(self, n: int = 1) -> "ScriptRun":
         for _ in range(n):
