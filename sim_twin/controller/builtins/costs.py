@@ -26,7 +26,7 @@ COSTS: dict[str, int] = {
     "get_target_tcp_speed": 180,
     "get_target_waypoint": 180,
     "interpolate_pose": 60,
-    "inv": 80,
+    "inv": 150,
     "is_within_safety_limits": _INVERSE,
     "movec": 8_000,
     "movej": 8_000,

@@ -10,7 +10,7 @@ from typing import TypeAlias
 
 from sim_twin.controller.script.costs import Spend, length_cost
 from sim_twin.controller.script.errors import ScriptRuntimeError
-from sim_twin.controller.script.values import ScriptStruct, Value, checked_size, described, joined
+from sim_twin.controller.script.values import ScriptStruct, Value, checked_work, described, joined
 
 __all__ = ["BINARY", "PLAIN", "UNARY", "binary_operators", "int32", "unary_operators"]
 
@@ -124,7 +124,7 @@ def _comparison(symbol: str, on_numbers: Callable[[Number, Number], bool]) -> Op
 def _equality(on_values: Operator, spend: Spend) -> Operator:
     def apply(a: Value, b: Value) -> Value:
         if type(a) is type(b) and type(a) in _LONG:
-            spend(length_cost(a) + checked_size(a))
+            spend(length_cost(a) + checked_work(a))
         return on_values(a, b)
 
     return apply

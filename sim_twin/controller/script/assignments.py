@@ -7,7 +7,7 @@ from sim_twin.controller.script.context import Scope
 from sim_twin.controller.script.expressions import compile_expression, compile_read
 from sim_twin.controller.script.syntax import Assign, Expression, Index, Member, Name
 from sim_twin.controller.script.threads import Steps
-from sim_twin.controller.script.values import ScriptStruct, Value, checked_size, item, member, stored, stored_member
+from sim_twin.controller.script.values import ScriptStruct, Value, checked_work, item, member, stored, stored_member
 
 __all__ = ["compile_assignment"]
 
@@ -85,7 +85,7 @@ def _part(read: Fast[Value], write: Write, path: list[_Step], value: Code[Value]
     def replace(frame: Frame, keys: list[Value], new: Value) -> None:
         whole = _replaced(read.run(frame), path, keys, new)
         if type(new) in (list, ScriptStruct, str):
-            spend(checked_size(whole) // _N_COUNTED)
+            spend(checked_work(whole) // _N_COUNTED)
         write(frame, whole)
 
     if isinstance(value, Fast) and not any(isinstance(step, Slow) for step in path):

@@ -8,7 +8,7 @@ from collections.abc import Callable
 
 import msgspec
 
-from sim_twin.controller.script.syntax import Definition, If, Statement, While
+from sim_twin.controller.script.syntax import Assign, Critical, Definition, If, Name, Statement, ThreadAction, While
 from sim_twin.controller.script.values import ScriptStruct, Value, copied_and_counted
 
 __all__ = ["BUILTIN", "CALL", "Spend", "copier", "length_cost", "round_cost", "statement_cost"]
@@ -21,6 +21,10 @@ BUILTIN = 20
 """Of a builtin that nobody named a cost of."""
 _N_COPIED = 2  # elements a step
 _N_CHARACTERS = 128  # a step
+_PART = 12  # a pose, a string, a list or a struct within another
+_SWITCH = 6  # where a thread waits for others, beside its turn
+_PLACE = 6  # where a part of a variable is assigned
+_NUMBERS = frozenset({bool, int, float})
 
 
 def statement_cost(node: Statement) -> int:
@@ -29,7 +33,10 @@ def statement_cost(node: Statement) -> int:
         return 1
     if isinstance(node, If):
         return 1 + sum(_n_nodes(test) for _, test, _ in node.branches)
-    return _n_nodes(node)
+    if isinstance(node, Critical | ThreadAction):
+        return _SWITCH + _n_nodes(node)
+    is_part = isinstance(node, Assign) and not isinstance(node.target, Name)
+    return _n_nodes(node) + (_PLACE if is_part else 0)
 
 
 def round_cost(node: While) -> int:
@@ -51,10 +58,12 @@ def copier(spend: Spend) -> Callable[[Value], Value]:
 
 
 def length_cost(value: Value) -> int:
-    """Return what it costs to go through a string, or over a list's first level."""
+    """Return what it costs to go through a string, or to write out all that a list or a struct has."""
     if type(value) is str:
         return len(value) // _N_CHARACTERS
-    return len(value) // _N_COPIED if type(value) is list else 0
+    if type(value) is list:
+        return len(value) // _N_COPIED + sum(_PART + length_cost(part) for part in value if type(part) not in _NUMBERS)
+    return sum(_PART + length_cost(part) for part in value.members.values()) if type(value) is ScriptStruct else 0
 
 
 def _n_nodes(node: object) -> int:

@@ -8,7 +8,7 @@ from sim_twin.controller.script.values import (
     MAX_ELEMENTS,
     ScriptStruct,
     Value,
-    checked_size,
+    checked_work,
     copied_and_counted,
     described,
 )
@@ -41,7 +41,7 @@ def _extend(spend: Spend, owner: list[Value], values: Value) -> None:
         raise ScriptRuntimeError(f"extend() expects a list, got {described(values)}")
     new, n = copied_and_counted(values)
     owner.extend(new if type(new) is list else [])
-    spend((n + checked_size(owner)) // _N_COUNTED)
+    spend((n + checked_work(owner)) // _N_COUNTED)
 
 
 def _insert(spend: Spend, owner: list[Value], index: Value, value: Value) -> None:
@@ -49,7 +49,7 @@ def _insert(spend: Spend, owner: list[Value], index: Value, value: Value) -> Non
     owner.insert(_place(owner, index, "insert", last=len(owner)), new)
     spend(n // _N_COUNTED)
     if len(owner) > MAX_ELEMENTS or type(value) in (list, ScriptStruct, str):
-        spend(checked_size(owner) // _N_COUNTED)
+        spend(checked_work(owner) // _N_COUNTED)
 
 
 def _remove(_: Spend, owner: list[Value], index: Value) -> None:

@@ -12,6 +12,7 @@ __all__ = [
     "ScriptStruct",
     "Value",
     "checked_size",
+    "checked_work",
     "copied",
     "copied_and_counted",
     "described",
@@ -31,6 +32,7 @@ MAX_ELEMENTS = 10_000
 """Of a list or a struct in all, those of its parts included; a string counts once more for every 1,024 characters."""
 MAX_CHARACTERS = 65_536
 _N_CHARACTERS = 1024  # that count as one more element
+_CONTAINER = 12  # elements that a list or a struct by itself takes as long as
 _N_SHOWN = 40  # characters of a value in a message
 
 
@@ -57,13 +59,13 @@ def copied(value: Value) -> Value:
 
 
 def copied_and_counted(value: Value) -> tuple[Value, int]:
-    """Return the copy and how many elements it has in all.
+    """Return the copy and how much work it was: its elements in all, a list or struct being as much as some.
 
     Raises:
         ScriptRuntimeError: there are too many.
     """
-    room = [MAX_ELEMENTS]
-    return _copied(value, room), MAX_ELEMENTS - room[0]
+    room = [MAX_ELEMENTS, 0]
+    return _copied(value, room), MAX_ELEMENTS - room[0] + room[1]
 
 
 def checked_size(value: Value) -> int:
@@ -72,13 +74,22 @@ def checked_size(value: Value) -> int:
     Raises:
         ScriptRuntimeError: there are too many.
     """
-    room = [MAX_ELEMENTS]
+    room = [MAX_ELEMENTS, 0]
     _count(value, room)
     return MAX_ELEMENTS - room[0]
 
 
+def checked_work(value: Value) -> int:
+    """Return how much work it is to go through a value, as `copied_and_counted` does; raises as `checked_size`."""
+    room = [MAX_ELEMENTS, 0]
+    _count(value, room)
+    return MAX_ELEMENTS - room[0] + room[1]
+
+
 def _take(n: int, room: list[int]) -> None:
+    """Take elements off the room, which stands first, and add a container's work to the second."""
     room[0] -= n
+    room[1] += _CONTAINER
     if room[0] < 0:
         raise ScriptRuntimeError(
             f"the list is too long, expected at most {MAX_ELEMENTS} elements in all, "
