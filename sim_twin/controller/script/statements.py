@@ -56,6 +56,7 @@ def _block(body: tuple[Statement, ...], scope: Scope) -> Code[Ending]:
     def run(frame: Frame) -> Ending:
         meter.left -= cost
         if meter.left < 0:
+            meter.place = fast[0][0]
             meter.spend(0)
         for place, step in fast:
             meter.place = place

@@ -90,10 +90,10 @@ class Thread:
 
     __slots__ = ("depth", "is_alive", "n_sections", "name", "place", "work")
 
-    def __init__(self, name: str, work: Steps[object]) -> None:
+    def __init__(self, name: str, work: Steps[object], place: Place) -> None:
         self.name = name
         self.work = work
-        self.place, self.depth = NOWHERE, 0
+        self.place, self.depth = place, 0
         self.is_alive = True
         self.n_sections = 0
 
@@ -123,7 +123,7 @@ class Scheduler:
         if max(self._n_started_in_slice, len(self._threads)) > _MAX_THREADS:
             raise ScriptRuntimeError(f"run {name}: expected at most {_MAX_THREADS} threads, and starts in one slice")
         self._n_started += 1
-        thread = Thread(name, work)
+        thread = Thread(name, work, self._meter.place)
         self._threads[self._n_started] = thread
         self._turn.append(thread)
         return self._n_started

@@ -107,3 +107,9 @@ def test_a_message_shows_the_beginning_of_a_long_value():
     message, _ = error_of(program("l = make_list(4000, [1])\nx = sin(l)"))
     assert "got the list [[1], [1], [1]" in message
     assert len(message) < 100
+
+
+def test_too_much_time_is_told_with_a_line_where_no_statement_was_begun():
+    run = ScriptRun("def prog():\n\n" + "x = 1\n" * 100 + "end", slice_budget=200).step()
+    assert "too much time" in run.interpreter.error.message
+    assert run.interpreter.error.line == 3
