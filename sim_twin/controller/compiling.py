@@ -8,6 +8,7 @@ from typing import Protocol, TypeAlias
 
 import msgspec
 
+from sim_twin.controller.builtins.costs import COSTS
 from sim_twin.controller.builtins.secondary import without_motion
 from sim_twin.controller.motion import SLICE_S
 from sim_twin.controller.script import Builtins, Interpreter, ScriptNameError, ScriptSyntaxError, parse_program
@@ -97,7 +98,8 @@ def compile_text(text: str, make_builtins: MakeBuiltins) -> Compiled | Mistake:
         program = parse_program(text)
         sockets = Sockets(slice_s=SLICE_S)
         builtins = make_builtins(sockets)
-        interpreter = Interpreter(program, without_motion(builtins) if program.is_secondary else builtins)
+        allowed = without_motion(builtins) if program.is_secondary else builtins
+        interpreter = Interpreter(program, allowed, costs=COSTS)
     except (ScriptSyntaxError, ScriptNameError) as error:
         return Mistake(message=str(error), as_reported=error.as_reported, line=error.line, column=error.column)
     except RecursionError:

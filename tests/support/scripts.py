@@ -41,9 +41,10 @@ class ScriptRun:
         self,
         text: str,
         *,
-        slice_budget: int = 2000,
+        slice_budget: int = 20_000,
         variables: Mapping[str, Value] | None = None,
         log: Log | None = None,
+        costs: Mapping[str, int] | None = None,
         **builtins: Builtin,
     ) -> None:
         self.notes: list[object] = []
@@ -53,7 +54,7 @@ class ScriptRun:
         offered = {**PURE, **time_builtins(slice_s=SLICE_S), **message_builtins(self.log)}
         offered |= {"note": self._note, "move": self._move, "fail": self._fail, **builtins}
         program = parse_program(text)
-        self.interpreter = Interpreter(program, offered, slice_budget=slice_budget, variables=variables)
+        self.interpreter = Interpreter(program, offered, slice_budget=slice_budget, variables=variables, costs=costs)
 
     def step(self, n: int = 1) -> "ScriptRun":
         for _ in range(n):
@@ -101,8 +102,8 @@ def value_of(expression: str) -> object:
 
 
 def error_of(body: str, **builtins: Builtin) -> tuple[str, int]:
-    """Run statements, the first on line 1, until they fail, and return the message and the line."""
-    run = ScriptRun(body, **builtins).finish()
+    """Run statements, the first on line 1, until they fail, and return the message and the line; time is no matter."""
+    run = ScriptRun(body, slice_budget=200_000, **builtins).finish()
     assert run.interpreter.status is Status.FAILED, "it did not fail"
     assert run.interpreter.error is not None
     return run.interpreter.error.message, run.interpreter.error.line

@@ -1,6 +1,7 @@
 """URScript's functions that need a robot, by topic; together with those that need none, all that a program can call."""
 
 from sim_twin.controller.builtins.control import control_builtins
+from sim_twin.controller.builtins.costs import COSTS
 from sim_twin.controller.builtins.dynamics import dynamics_builtins
 from sim_twin.controller.builtins.forces import force_builtins
 from sim_twin.controller.builtins.guiding import guiding_builtins
@@ -17,7 +18,7 @@ from sim_twin.controller.motion import SLICE_S
 from sim_twin.controller.script import Builtins
 from sim_twin.controller.script.builtins import PURE, Sockets, message_builtins, time_builtins
 
-__all__ = ["program_builtins", "robot_builtins"]
+__all__ = ["COSTS", "program_builtins", "robot_builtins"]
 
 
 def robot_builtins(machine: Machine) -> Builtins:

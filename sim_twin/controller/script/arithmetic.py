@@ -6,13 +6,22 @@ Poses have no operators on a robot either: pose_add, pose_sub and pose_trans are
 import math
 import operator
 from collections.abc import Callable
+from typing import TypeAlias
 
+from sim_twin.controller.script.costs import Spend, length_cost
 from sim_twin.controller.script.errors import ScriptRuntimeError
-from sim_twin.controller.script.values import Value, described, joined
+from sim_twin.controller.script.values import ScriptStruct, Value, checked_work, described, joined
 
-__all__ = ["BINARY", "UNARY", "int32"]
+__all__ = ["BINARY", "PLAIN", "UNARY", "binary_operators", "int32", "unary_operators"]
 
 Number = int | float
+Operator: TypeAlias = Callable[[Value, Value], Value]
+
+_PAIR = 3
+"""Steps of the budget for each element of a list operation."""
+_PRODUCT = 6
+"""Likewise for each pair of elements that a matrix product multiplies."""
+_LONG = (list, ScriptStruct, str)
 
 
 def int32(number: int) -> int:
@@ -33,7 +42,7 @@ def _remainder(a: Number, b: Number) -> Number:
     return int(rest) if type(a) is int and type(b) is int else rest
 
 
-def _arithmetic(symbol: str, on_numbers: Callable[[Number, Number], Number]) -> Callable[[Value, Value], Value]:
+def _arithmetic(symbol: str, on_numbers: Callable[[Number, Number], Number], spend: Spend) -> Operator:
     """Spread an operator on numbers over lists, number by number."""
 
     def apply(a: Value, b: Value) -> Value:
@@ -44,46 +53,53 @@ def _arithmetic(symbol: str, on_numbers: Callable[[Number, Number], Number]) -> 
                 return int32(result)
             return result
         if type(a) is list or type(b) is list:
-            return _on_lists(symbol, apply, a, b)
+            spend(_PAIR * max(len(side) for side in (a, b) if type(side) is list))
+            return _on_lists(symbol, apply, a, b, spend)
         if type(a) is str and type(b) is str and symbol == "+":
+            spend(length_cost(a) + length_cost(b))
             return joined(a, b)
         raise ScriptRuntimeError(f"{described(a)} {symbol} {described(b)} is not defined{_hint(a, b)}")
 
     return apply
 
 
-def _on_lists(symbol: str, apply: Callable[[Value, Value], Value], a: Value, b: Value) -> Value:
+def _on_lists(symbol: str, apply: Operator, a: Value, b: Value, spend: Spend) -> Value:
     """Apply an operator where at least one side is a list."""
     if type(a) is not list:
         return [apply(a, part) for part in b] if type(b) is list else None
     if type(b) is not list:
         return [apply(part, b) for part in a]
     if symbol == "*" and a and type(a[0]) is list:
-        return _matrix_product(a, b, apply)
+        return _matrix_product(a, b, apply, spend)
     if len(a) != len(b):
         raise ScriptRuntimeError(f"list {symbol} list needs equal lengths, got {len(a)} and {len(b)}")
     return [apply(x, y) for x, y in zip(a, b, strict=True)]
 
 
-def _matrix_product(a: list[Value], b: list[Value], multiply: Callable[[Value, Value], Value]) -> list[Value]:
+def _matrix_product(a: list[Value], b: list[Value], multiply: Operator, spend: Spend) -> list[Value]:
     """Return the product of a matrix with a matrix or an array."""
     width = len(b)
     if any(type(row) is not list or len(row) != width for row in a):
         raise ScriptRuntimeError(f"matrix * needs as many columns on the left as rows on the right, which are {width}")
     rows = [row for row in a if type(row) is list]
     if b and type(b[0]) is list:
-        columns = [[row[j] for row in b if type(row) is list] for j in range(len(b[0]))]
-        if any(len(column) != width for column in columns):
+        spend(_PRODUCT * len(a) * max(1, width) * len(b[0]))
+        columns = [[row[j] for row in b if type(row) is list and j < len(row)] for j in range(len(b[0]))]
+        if any(type(row) is not list or len(row) != len(columns) for row in b):
             raise ScriptRuntimeError("matrix * needs rows of equal length on the right")
         return [[_dot(row, column, multiply) for column in columns] for row in rows]
+    spend(_PRODUCT * len(a) * width)
     return [_dot(row, b, multiply) for row in rows]
 
 
-def _dot(a: list[Value], b: list[Value], multiply: Callable[[Value, Value], Value]) -> Value:
+def _dot(a: list[Value], b: list[Value], multiply: Operator) -> Value:
     add = BINARY["+"]
     total: Value = 0
     for x, y in zip(a, b, strict=True):
-        total = add(total, multiply(x, y))
+        if type(x) is float and type(y) is float and (type(total) is float or type(total) is int):
+            total += x * y
+        else:
+            total = add(total, multiply(x, y))
     return total
 
 
@@ -95,7 +111,7 @@ def _hint(a: Value, b: Value) -> str:
     return ""
 
 
-def _comparison(symbol: str, on_numbers: Callable[[Number, Number], bool]) -> Callable[[Value, Value], Value]:
+def _comparison(symbol: str, on_numbers: Callable[[Number, Number], bool]) -> Operator:
     def apply(a: Value, b: Value) -> Value:
         type_a, type_b = type(a), type(b)
         if (type_a is float or type_a is int) and (type_b is float or type_b is int):
@@ -105,14 +121,27 @@ def _comparison(symbol: str, on_numbers: Callable[[Number, Number], bool]) -> Ca
     return apply
 
 
-def _negate(value: Value) -> Value:
-    if type(value) is int:
-        return int32(-value)
-    if type(value) is float:
-        return -value
-    if type(value) is list:
-        return [_negate(part) for part in value]
-    raise ScriptRuntimeError(f"expected a number after -, got {described(value)}")
+def _equality(on_values: Operator, spend: Spend) -> Operator:
+    def apply(a: Value, b: Value) -> Value:
+        if type(a) is type(b) and type(a) in _LONG:
+            spend(length_cost(a) + checked_work(a))
+        return on_values(a, b)
+
+    return apply
+
+
+def _negation(spend: Spend) -> Callable[[Value], Value]:
+    def negate(value: Value) -> Value:
+        if type(value) is int:
+            return int32(-value)
+        if type(value) is float:
+            return -value
+        if type(value) is list:
+            spend(_PAIR * len(value))
+            return [negate(part) for part in value]
+        raise ScriptRuntimeError(f"expected a number after -, got {described(value)}")
+
+    return negate
 
 
 def _keep(value: Value) -> Value:
@@ -121,18 +150,34 @@ def _keep(value: Value) -> Value:
     raise ScriptRuntimeError(f"expected a number after +, got {described(value)}")
 
 
-BINARY: dict[str, Callable[[Value, Value], Value]] = {
-    "+": _arithmetic("+", operator.add),
-    "-": _arithmetic("-", operator.sub),
-    "*": _arithmetic("*", operator.mul),
-    "/": _arithmetic("/", _divide),
-    "%": _arithmetic("%", _remainder),
-    "==": operator.eq,
-    "!=": operator.ne,
-    "<": _comparison("<", operator.lt),
-    "<=": _comparison("<=", operator.le),
-    ">": _comparison(">", operator.gt),
-    ">=": _comparison(">=", operator.ge),
-}
+def binary_operators(spend: Spend) -> dict[str, Operator]:
+    """Return the operators between two operands; what they do to lists and strings is spent."""
+    return {
+        "+": _arithmetic("+", operator.add, spend),
+        "-": _arithmetic("-", operator.sub, spend),
+        "*": _arithmetic("*", operator.mul, spend),
+        "/": _arithmetic("/", _divide, spend),
+        "%": _arithmetic("%", _remainder, spend),
+        "==": _equality(operator.eq, spend),
+        "!=": _equality(operator.ne, spend),
+        "<": _comparison("<", operator.lt),
+        "<=": _comparison("<=", operator.le),
+        ">": _comparison(">", operator.gt),
+        ">=": _comparison(">=", operator.ge),
+    }
 
-UNARY: dict[str, Callable[[Value], Value]] = {"-": _negate, "+": _keep}
+
+def unary_operators(spend: Spend) -> dict[str, Callable[[Value], Value]]:
+    """Return the operators before an operand."""
+    return {"-": _negation(spend), "+": _keep}
+
+
+def _free(_: int) -> None:
+    return None
+
+
+PLAIN: dict[str, Operator] = {"==": operator.eq, "!=": operator.ne}
+"""Fit where one side is a constant, which no list is."""
+BINARY = binary_operators(_free)
+"""For whoever has no budget."""
+UNARY = unary_operators(_free)

@@ -7,11 +7,12 @@ from sim_twin.controller.script.context import Scope
 from sim_twin.controller.script.expressions import compile_expression, compile_read
 from sim_twin.controller.script.syntax import Assign, Expression, Index, Member, Name
 from sim_twin.controller.script.threads import Steps
-from sim_twin.controller.script.values import Value, copied, item, member, stored, stored_member
+from sim_twin.controller.script.values import ScriptStruct, Value, checked_work, item, member, stored, stored_member
 
 __all__ = ["compile_assignment"]
 
 Write = Callable[[Frame, Value], None]
+_N_COUNTED = 3  # elements a step of the budget
 _Step = Code[Value] | str  # an index, or a member's name
 
 
@@ -19,9 +20,9 @@ def compile_assignment(node: Assign, scope: Scope) -> Code[Signal | None]:
     """Compile target = value."""
     value = compile_expression(node.value, scope)
     if isinstance(node.target, Name):
-        return _whole(_compile_write(node.target.name, node.scope, scope), value)
+        return _whole(_compile_write(node.target.name, node.scope, scope), value, scope.context.copied)
     name, path = _path(node.target, scope)
-    return _part(compile_read(name, scope), _compile_write(name, "", scope), path, value)
+    return _part(compile_read(name, scope), _compile_write(name, "", scope), path, value, scope)
 
 
 def _compile_write(name: str, word: str, scope: Scope) -> Write:
@@ -47,7 +48,7 @@ def _compile_write(name: str, word: str, scope: Scope) -> Write:
     return write_open if name in scope.is_open else write_own
 
 
-def _whole(write: Write, value: Code[Value]) -> Code[Signal | None]:
+def _whole(write: Write, value: Code[Value], copied: Callable[[Value], Value]) -> Code[Signal | None]:
     if isinstance(value, Fast):
         evaluate = value.run
 
@@ -78,14 +79,22 @@ def _path(target: Index | Member, scope: Scope) -> tuple[str, list[_Step]]:
     return node.name, steps[::-1]
 
 
-def _part(read: Fast[Value], write: Write, path: list[_Step], value: Code[Value]) -> Code[Signal | None]:
+def _part(read: Fast[Value], write: Write, path: list[_Step], value: Code[Value], scope: Scope) -> Code[Signal | None]:
+    copied, spend = scope.context.copied, scope.context.meter.spend
+
+    def replace(frame: Frame, keys: list[Value], new: Value) -> None:
+        whole = _replaced(read.run(frame), path, keys, new)
+        if type(new) in (list, ScriptStruct, str):
+            spend(checked_work(whole) // _N_COUNTED)
+        write(frame, whole)
+
     if isinstance(value, Fast) and not any(isinstance(step, Slow) for step in path):
         fast = [step.run if isinstance(step, Fast) else step for step in path]
 
         def run(frame: Frame) -> Signal | None:
             new = copied(value.run(frame))
             keys = [step if isinstance(step, str) else step(frame) for step in fast]  # pyright: ignore[reportCallIssue]
-            write(frame, _replaced(read.run(frame), path, keys, new))
+            replace(frame, keys, new)
             return None
 
         return Fast(run)
@@ -98,7 +107,7 @@ def _part(read: Fast[Value], write: Write, path: list[_Step], value: Code[Value]
                 keys.append(step)
             else:
                 keys.append((yield from step.run(frame)) if isinstance(step, Slow) else step.run(frame))
-        write(frame, _replaced(read.run(frame), path, keys, new))
+        replace(frame, keys, new)
         return None
 
     return Slow(run_slowly)

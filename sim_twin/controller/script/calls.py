@@ -6,10 +6,11 @@ from types import GeneratorType
 
 from sim_twin.controller.script.code import Builtin, Code, Fast, Frame, Slow, applied
 from sim_twin.controller.script.context import Context, Routine, Scope, takes_time
+from sim_twin.controller.script.costs import length_cost
 from sim_twin.controller.script.errors import ScriptRuntimeError
 from sim_twin.controller.script.syntax import Call, Definition, Expression, Place, Run
 from sim_twin.controller.script.threads import Steps, Wait
-from sim_twin.controller.script.values import Value, copied, described
+from sim_twin.controller.script.values import Value, described
 
 __all__ = ["compile_call", "compile_run"]
 
@@ -38,7 +39,7 @@ def compile_call(node: Call, scope: Scope, compiled: Callable[[Expression], Code
     mistake = _mistake(node.name, _parameters_of(scope.context.signature(node.name)), len(positional), keywords)
     if mistake:
         return _failing(mistake)
-    return _call_of_builtin(node.name, builtin, positional, keywords)
+    return _call_of_builtin(node.name, builtin, positional, keywords, scope.context)
 
 
 def compile_run(node: Run, scope: Scope) -> Code[Value]:
@@ -116,7 +117,7 @@ def _call_of_routine(context: Context, routine: Routine, bound: dict[str, Code[V
     if routine.definition.name in context.slow or any(isinstance(code, Slow) for _, code in arguments):
         return _slow_call(context, routine, arguments, defaults)
     fast = [(place, code.run) for place, code in arguments if isinstance(code, Fast)]
-    meter = context.meter
+    meter, copied = context.meter, context.copied
 
     def call(frame: Frame) -> Value:
         inner = routine.frame()
@@ -142,7 +143,7 @@ def _slow_call(
     arguments: list[tuple[int, Code[Value]]],
     defaults: list[tuple[int, str]],
 ) -> Code[Value]:
-    meter = context.meter
+    meter, copied = context.meter, context.copied
 
     def call(frame: Frame) -> Steps[Value]:
         inner = routine.frame()
@@ -167,6 +168,7 @@ def _slow_call(
 def _open(context: Context, routine: Routine) -> Place:
     """Begin a call; return the statement that it stands in, which is the one again once it is over."""
     meter = context.meter
+    meter.left -= routine.cost
     meter.depth += 1
     if meter.depth > _MAX_DEPTH:
         name = routine.definition.name
@@ -186,8 +188,10 @@ def _call_of_builtin(
     builtin: Builtin,
     positional: list[Code[Value]],
     keywords: Mapping[str, Code[Value]],
+    context: Context,
 ) -> Code[Value]:
     n_positional, names = len(positional), list(keywords)
+    spend, copied, cost = context.meter.spend, context.copied, context.cost(called)
 
     def failed(error: Exception, values: Sequence[Value]) -> ScriptRuntimeError:
         return ScriptRuntimeError(f"{called}(): {_reason(error, values)}")
@@ -199,6 +203,7 @@ def _call_of_builtin(
     function = named if names else builtin
 
     def result_of(*values: Value) -> "Value | Generator[Wait | None, None, Value]":
+        spend(cost + sum(map(length_cost, values)))
         try:
             return function(*map(copied, values))
         except _BAD_ARGUMENTS as error:
@@ -209,12 +214,15 @@ def _call_of_builtin(
         return _slow_builtin(operands, result_of, failed)
 
     def value_of(*values: Value) -> Value:
+        spend(cost + sum(map(length_cost, values)))
         try:
             result = function(*map(copied, values))
         except _BAD_ARGUMENTS as error:
             raise failed(error, values) from error
         if type(result) is GeneratorType:
             raise TypeError(f"builtin {called} returned a generator, so declare it as a generator function")
+        if type(result) is list or type(result) is str:
+            spend(length_cost(result))
         return result  # pyright: ignore[reportReturnType] - no generator, as tested
 
     return applied(value_of, operands)

@@ -3,7 +3,9 @@
 import inspect
 from collections.abc import Mapping
 
+from sim_twin.controller.script.arithmetic import binary_operators, unary_operators
 from sim_twin.controller.script.code import UNSET, Builtin, Builtins, Code, Frame, Signal
+from sim_twin.controller.script.costs import BUILTIN, CALL, copier
 from sim_twin.controller.script.scopes import (
     Functions,
     assigned_names,
@@ -31,6 +33,9 @@ class Context:
         builtins: What the host offers.
         meter: Place and budget of the running thread.
         scheduler: The threads.
+        copied: Copies a value and takes the cost off the meter.
+        binary: Operators by their symbols, which do so too.
+        unary: Likewise, before one operand.
         globals: Values of the global variables.
         global_places: Where in it each is.
         slow: Names of the program's functions that can take time.
@@ -46,9 +51,13 @@ class Context:
         scheduler: Scheduler,
         meter: Meter,
         variables: Mapping[str, Value],
+        costs: Mapping[str, int],
     ) -> None:
         self.builtins = builtins
         self.meter = meter
+        self._costs = costs
+        self.copied = copier(meter.spend)
+        self.binary, self.unary = binary_operators(meter.spend), unary_operators(meter.spend)
         self.scheduler = scheduler
         self.global_places = {name: i for i, name in enumerate(sorted(global_names(program) | variables.keys()))}
         self.globals: Frame = [variables.get(name, UNSET) for name in self.global_places]
@@ -65,6 +74,10 @@ class Context:
             self._routines[id(definition)] = known
             self.to_compile.append(known)
         return known
+
+    def cost(self, name: str) -> int:
+        """Return what a call of a builtin costs, beside its arguments and what it returns."""
+        return self._costs.get(name, BUILTIN)
 
     def signature(self, name: str) -> inspect.Signature | None:
         """Return a builtin's signature, or None where Python knows none; to look it up takes as long as ten calls."""
@@ -124,6 +137,7 @@ class Routine:
         scope: Of its body.
         body: Its code, set once compiled; a recursive call finds it there when it runs.
         defaults: Code of the parameters' defaults, likewise.
+        cost: Of a call.
     """
 
     def __init__(self, definition: Definition, scope: Scope) -> None:
@@ -131,6 +145,7 @@ class Routine:
         self.scope = scope
         self.body: Code[Signal | None] | None = None
         self.defaults: dict[str, Code[Value]] = {}
+        self.cost = CALL + len(scope.places) // 8
         self._blank: Frame = [None, *[UNSET] * len(scope.places)]
 
     def frame(self) -> Frame:

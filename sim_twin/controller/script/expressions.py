@@ -4,7 +4,7 @@ from collections.abc import Callable
 from functools import partial
 
 from sim_twin.controller.pose import Pose
-from sim_twin.controller.script.arithmetic import BINARY, UNARY
+from sim_twin.controller.script.arithmetic import PLAIN
 from sim_twin.controller.script.calls import compile_call, compile_run
 from sim_twin.controller.script.code import UNSET, Code, Fast, Frame, Slow, applied
 from sim_twin.controller.script.context import Scope
@@ -28,7 +28,7 @@ from sim_twin.controller.script.syntax import (
     Unary,
 )
 from sim_twin.controller.script.threads import Steps
-from sim_twin.controller.script.values import ScriptStruct, Value, copied, described, item, member, truth
+from sim_twin.controller.script.values import ScriptStruct, Value, described, item, member, truth
 
 __all__ = ["compile_expression", "compile_read"]
 
@@ -92,6 +92,7 @@ def _compiled(nodes: tuple[Expression, ...], scope: Scope) -> list[Code[Value]]:
 
 
 def _list(node: ListLiteral, scope: Scope) -> Code[Value]:
+    copied = scope.context.copied
     return applied(lambda *elements: [copied(element) for element in elements], _compiled(node.elements, scope))
 
 
@@ -106,7 +107,7 @@ def _pose(node: PoseLiteral, scope: Scope) -> Code[Value]:
 
 
 def _struct(node: StructLiteral, scope: Scope) -> Code[Value]:
-    names = [name for name, _ in node.members]
+    names, copied = [name for name, _ in node.members], scope.context.copied
 
     def made(*values: Value) -> Value:
         return ScriptStruct({name: copied(value) for name, value in zip(names, values, strict=True)})
@@ -115,7 +116,7 @@ def _struct(node: StructLiteral, scope: Scope) -> Code[Value]:
 
 
 def _unary(node: Unary, scope: Scope) -> Code[Value]:
-    return applied(UNARY[node.symbol], [compile_expression(node.operand, scope)])
+    return applied(scope.context.unary[node.symbol], [compile_expression(node.operand, scope)])
 
 
 def _not(node: Not, scope: Scope) -> Code[Value]:
@@ -123,7 +124,10 @@ def _not(node: Not, scope: Scope) -> Code[Value]:
 
 
 def _binary(node: Binary, scope: Scope) -> Code[Value]:
-    return applied(BINARY[node.symbol], _compiled((node.left, node.right), scope))
+    operator = scope.context.binary[node.symbol]
+    if isinstance(node.left, Constant) or isinstance(node.right, Constant):
+        operator = PLAIN.get(node.symbol, operator)
+    return applied(operator, _compiled((node.left, node.right), scope))
 
 
 def _logic(node: Logic, scope: Scope) -> Code[Value]:
@@ -166,9 +170,9 @@ def _member(node: Member, scope: Scope) -> Code[Value]:
 
 
 def _method(node: MethodCall, scope: Scope) -> Code[Value]:
-    name = node.name
+    name, spend = node.name, scope.context.meter.spend
     operands = _compiled((node.owner, *node.arguments), scope)
-    return applied(lambda owner, *arguments: call_method(owner, name, *arguments), operands)
+    return applied(lambda owner, *arguments: call_method(spend, owner, name, *arguments), operands)
 
 
 def _call(node: Call, scope: Scope) -> Code[Value]:

@@ -14,7 +14,8 @@ from sim_twin.controller.script.values import Value, copied
 
 __all__ = ["DEFAULT_SLICE_BUDGET", "Interpreter", "Status"]
 
-DEFAULT_SLICE_BUDGET = 20_000  # statements of one thread in one slice; some ten milliseconds of Python
+DEFAULT_SLICE_BUDGET = 40_000
+"""What a program may spend in one slice, all its threads together: some four milliseconds of Python."""
 
 
 class Status(enum.StrEnum):
@@ -40,6 +41,7 @@ class Interpreter:
         *,
         slice_budget: int = DEFAULT_SLICE_BUDGET,
         variables: Mapping[str, Value] | None = None,
+        costs: Mapping[str, int] | None = None,
     ) -> None:
         """Compile.
 
@@ -47,9 +49,11 @@ class Interpreter:
             program: What to run.
             builtins: The functions that the robot offers. One that takes time is a generator function: each yield
                 takes the rest of the thread's slice, and what it returns is the call's value. A TypeError, ValueError,
-                LookupError, ArithmeticError or ScriptRuntimeError that one raises ends the program.
-            slice_budget: How many statements one thread may execute in one slice.
+                LookupError, ArithmeticError or ScriptRuntimeError that one raises ends the program
+                as the script's mistake, any other exception as the controller's.
+            slice_budget: What the program may spend in one slice, all threads together; see costs.py.
             variables: Global variables that exist before the program begins.
+            costs: What a call of each builtin costs; one that is not there costs what most do.
 
         Raises:
             ScriptNameError: the program uses a name that nothing has.
@@ -67,6 +71,7 @@ class Interpreter:
             scheduler=self._scheduler,
             meter=self._meter,
             variables={name: copied(value) for name, value in (variables or {}).items()},
+            costs=costs or {},
         )
         definition = Definition(Place(1, 1), program.name, False, (), program.body)
         scope = Scope(context, definition, None, is_main=True)
@@ -92,6 +97,8 @@ class Interpreter:
             self._fail(str(error))
         except RecursionError:
             self._fail("calls and expressions are nested too deep")
+        except Exception as error:  # noqa: BLE001 - whatever a program brings about, the controller outlives it
+            self._fail(f"the controller failed at this, not the program: {error!r}")
         else:
             if not self._main.is_alive:
                 self._end(Status.FINISHED)
@@ -109,8 +116,12 @@ class Interpreter:
         self._end(Status.FAILED)
 
     def _end(self, status: Status) -> None:
-        self._scheduler.stop()
         self.status = status
+        try:
+            self._scheduler.stop()
+        except Exception as error:  # noqa: BLE001 - as in step
+            if self.error is None:
+                self._fail(f"the controller failed to end this: {error!r}")
 
 
 def _work(body: Code[Signal | None]) -> Steps[object]:

@@ -6,7 +6,7 @@ from typing import Any
 from sim_twin.controller.script.assignments import compile_assignment
 from sim_twin.controller.script.code import Code, Fast, Frame, Signal, Slow
 from sim_twin.controller.script.context import Routine, Scope
-from sim_twin.controller.script.errors import ScriptRuntimeError
+from sim_twin.controller.script.costs import round_cost, statement_cost
 from sim_twin.controller.script.expressions import compile_expression
 from sim_twin.controller.script.syntax import (
     Assign,
@@ -23,7 +23,7 @@ from sim_twin.controller.script.syntax import (
     While,
 )
 from sim_twin.controller.script.threads import ProgramHalted, Steps, Wait
-from sim_twin.controller.script.values import Value, copied, truth
+from sim_twin.controller.script.values import Value, truth
 
 __all__ = ["compile_body", "compile_routine"]
 
@@ -45,16 +45,19 @@ def compile_routine(routine: Routine) -> None:
 
 
 def _block(body: tuple[Statement, ...], scope: Scope) -> Code[Ending]:
-    steps = [(node.place, _COMPILERS[type(node)](node, scope)) for node in body if not isinstance(node, Definition)]
+    nodes = [node for node in body if not isinstance(node, Definition)]
+    steps = [(node.place, _COMPILERS[type(node)](node, scope)) for node in nodes]
+    costs = [statement_cost(node) for node in nodes]
     fast = [(place, step.run) for place, step in steps if isinstance(step, Fast)]
     if len(fast) < len(steps):
-        return _slow_block(steps, scope)
-    meter, cost = scope.context.meter, len(steps)
+        return _slow_block(steps, costs, scope)
+    meter, cost = scope.context.meter, sum(costs)
 
     def run(frame: Frame) -> Ending:
         meter.left -= cost
         if meter.left < 0:
-            _exhausted(scope)
+            meter.place = fast[0][0]
+            meter.spend(0)
         for place, step in fast:
             meter.place = place
             signal = step(frame)
@@ -65,31 +68,25 @@ def _block(body: tuple[Statement, ...], scope: Scope) -> Code[Ending]:
     return Fast(run)
 
 
-def _slow_block(steps: list[tuple[Place, Code[Ending]]], scope: Scope) -> Code[Ending]:
-    meter, cost = scope.context.meter, len(steps)
+def _slow_block(steps: list[tuple[Place, Code[Ending]]], costs: list[int], scope: Scope) -> Code[Ending]:
+    meter = scope.context.meter
     # Whether a step may take time is asked here once, not at every turn.
-    kinds: list[tuple[Place, Callable[[Frame], Any], bool]] = [(n, s.run, isinstance(s, Slow)) for n, s in steps]
+    kinds: list[tuple[Place, Callable[[Frame], Any], bool, int]] = [
+        (place, step.run, isinstance(step, Slow), cost) for (place, step), cost in zip(steps, costs, strict=True)
+    ]
 
     def run(frame: Frame) -> Steps[Ending]:
-        meter.left -= cost
-        if meter.left < 0:
-            _exhausted(scope)
-        for place, step, is_slow in kinds:
+        for place, step, is_slow, cost in kinds:
             meter.place = place
+            meter.left -= cost
+            if meter.left < 0:
+                meter.spend(0)
             signal = (yield from step(frame)) if is_slow else step(frame)
             if signal is not None:
                 return signal
         return None
 
     return Slow(run)
-
-
-def _exhausted(scope: Scope) -> None:
-    running = scope.context.scheduler.running
-    name = running.name if running is not None else "main"
-    raise ScriptRuntimeError(
-        f"the thread '{name}' used too much time in one slice, is this an infinite loop? Put sync() or sleep() into it"
-    )
 
 
 def _assign(node: Assign, scope: Scope) -> Code[Ending]:
@@ -152,13 +149,13 @@ def _if(node: If, scope: Scope) -> Code[Ending]:
 
 def _while(node: While, scope: Scope) -> Code[Ending]:
     test, block = compile_expression(node.condition, scope), _block(node.body, scope)
-    meter, place = scope.context.meter, node.place
+    meter, place, cost = scope.context.meter, node.place, round_cost(node)
 
     def begin_round() -> None:
         meter.place = place
-        meter.left -= 1
+        meter.left -= cost
         if meter.left < 0:
-            _exhausted(scope)
+            meter.spend(0)
 
     if isinstance(test, Fast) and isinstance(block, Fast):
         return _fast_while(test.run, block.run, begin_round)
@@ -202,7 +199,7 @@ def _jump(node: Jump, _: Scope) -> Code[Ending]:
 def _return(node: Return, scope: Scope) -> Code[Ending]:
     if node.value is None:
         return Fast(lambda _: Signal.RETURN)
-    code = compile_expression(node.value, scope)
+    code, copied = compile_expression(node.value, scope), scope.context.copied
 
     def run(frame: Frame) -> Ending:
         if isinstance(code, Fast):

@@ -5,7 +5,12 @@ threads were started until it takes time, waits or ends. A critical section hold
 too; when it opens, whoever was held off gets its turn in the same slice, before the section closes again: scripts
 that leave a section only to enter it anew, as those of UR's own drivers do, would starve the others otherwise. Those
 scripts also join threads and read from sockets within a section, and count on the others going on meanwhile: a section
-holds nobody off while its holder waits for a thread or for something outside.
+holds nobody off while its holder waits for a thread or for something outside. Another may enter one meanwhile; then
+the first, once it has what it waited for, is held off itself until the other leaves or waits: of those in a section
+one goes on at a time.
+
+What a slice may cost is counted, not timed, so that every run is the same: all threads of a program spend from one
+budget, which every slice begins with.
 """
 
 import enum
@@ -22,6 +27,8 @@ T = TypeVar("T")
 
 
 _MAX_THREADS = 100
+_TURN = 7
+"""What a thread's turn costs beside what it executes."""
 NOWHERE = Place(0, 0)
 
 
@@ -51,30 +58,44 @@ class Meter:
 
     Attributes:
         place: Where the statement that is being executed begins.
-        left: How many operations the thread may still execute in this slice.
+        left: What the program may still spend in this slice, in steps of some 0.1 µs of Python.
         depth: How many calls are open.
+        name: The running thread's.
     """
 
-    __slots__ = ("depth", "left", "place")
+    __slots__ = ("depth", "left", "name", "place")
 
     def __init__(self) -> None:
         self.place = NOWHERE
         self.left = 0
         self.depth = 0
+        self.name = ""
+
+    def spend(self, cost: int) -> None:
+        """Take a cost off what is left.
+
+        Raises:
+            ScriptRuntimeError: there is not so much left.
+        """
+        self.left -= cost
+        if self.left < 0:
+            raise ScriptRuntimeError(
+                f"the thread '{self.name}' used too much time in one slice, is this an infinite loop? "
+                "Put sync() or sleep() into it"
+            )
 
 
 class Thread:
-    """One thread: its work as a generator, and its side of the meter while another runs."""
+    """One thread: its work as a generator, its side of the meter while another runs, how many sections it is in."""
 
-    __slots__ = ("depth", "is_alive", "is_waiting", "left", "name", "place", "work")
+    __slots__ = ("depth", "is_alive", "n_sections", "name", "place", "work")
 
-    def __init__(self, name: str, work: Steps[object], budget: int) -> None:
+    def __init__(self, name: str, work: Steps[object], place: Place) -> None:
         self.name = name
         self.work = work
-        self.left = budget
-        self.place, self.depth = NOWHERE, 0
+        self.place, self.depth = place, 0
         self.is_alive = True
-        self.is_waiting = False
+        self.n_sections = 0
 
 
 class Scheduler:
@@ -92,7 +113,7 @@ class Scheduler:
         self._n_started = self._n_started_in_slice = 0
         self._turn: list[Thread] = []
         self._main: Thread | None = None
-        self._sections: list[Thread] = []  # open ones, by who entered
+        self._holder: Thread | None = None  # the one in a section that does not wait
         self._held_off: set[Thread] = set()
         self.running: Thread | None = None
 
@@ -102,7 +123,7 @@ class Scheduler:
         if max(self._n_started_in_slice, len(self._threads)) > _MAX_THREADS:
             raise ScriptRuntimeError(f"run {name}: expected at most {_MAX_THREADS} threads, and starts in one slice")
         self._n_started += 1
-        thread = Thread(name, work, self._budget)
+        thread = Thread(name, work, self._meter.place)
         self._threads[self._n_started] = thread
         self._turn.append(thread)
         return self._n_started
@@ -127,10 +148,16 @@ class Scheduler:
         return self._thread(handle, "join") is not None
 
     def stop(self) -> None:
-        """End all threads."""
+        """End all threads; where one cannot clean up after itself, the others are ended all the same."""
+        failures: list[Exception] = []
         for thread in list(self._threads.values()):
-            thread.work.close()
             self._end(thread)
+            try:
+                thread.work.close()
+            except Exception as error:  # noqa: BLE001 - told below
+                failures.append(error)
+        if failures:
+            raise failures[0]
 
     @property
     def is_contended(self) -> bool:
@@ -140,17 +167,16 @@ class Scheduler:
     def enter(self) -> None:
         """Hold the other threads off; sections nest."""
         if self.running is not None:
-            self._sections.append(self.running)
+            self.running.n_sections += 1
 
     def leave(self) -> None:
         """Leave one section; without one there is nothing to leave."""
-        if self._sections and self._sections[-1] is self.running:
-            self._sections.pop()
+        if self.running is not None and self.running.n_sections:
+            self.running.n_sections -= 1
 
     def step(self) -> None:
         """Run one slice, or as much of it as there is before the main thread ends."""
-        for thread in self._threads.values():
-            thread.left = self._budget
+        self._meter.left = self._budget
         self._turn = turn = list(self._threads.values())
         self._n_started_in_slice = 0
         while turn:
@@ -166,13 +192,13 @@ class Scheduler:
         for thread in turn:  # grows while threads are started
             if not thread.is_alive:
                 continue
-            if self._is_held_off(thread):
+            if self._holder not in (None, thread):
                 self._held_off.add(thread)
                 again.append(thread)
                 continue
             self._held_off.discard(thread)
             wait = self._advance(thread)
-            thread.is_waiting = wait in _LETS_RUN
+            self._holder = thread if thread.is_alive and thread.n_sections and wait not in _LETS_RUN else None
             if wait is not None and wait is not Wait.OUTSIDE:
                 again.append(thread)
             is_any_ahead |= wait is not Wait.JOIN
@@ -180,22 +206,18 @@ class Scheduler:
                 return [], False
         return again, is_any_ahead
 
-    def _is_held_off(self, thread: Thread) -> bool:
-        """Return whether another holds the section; one that waits lets them run."""
-        holder = self._sections[-1] if self._sections else thread
-        return holder is not thread and not holder.is_waiting
-
     def _advance(self, thread: Thread) -> Wait | None:
         meter = self._meter
-        meter.place, meter.left, meter.depth = thread.place, thread.left, thread.depth
+        meter.place, meter.depth, meter.name = thread.place, thread.depth, thread.name
         self.running = thread
+        meter.spend(_TURN)
         try:
             wait = thread.work.send(None)
         except (StopIteration, _ThreadEnded):
             self._end(thread)
             return None
         finally:
-            thread.place, thread.left, thread.depth = meter.place, meter.left, meter.depth
+            thread.place, thread.depth = meter.place, meter.depth
         if isinstance(wait, Wait) and wait is not Wait.OUTSIDE:
             return wait
         if not self._may_take_time:
@@ -213,5 +235,5 @@ class Scheduler:
         thread.is_alive = False
         self._threads = {handle: other for handle, other in self._threads.items() if other is not thread}
         self._held_off.discard(thread)
-        if thread in self._sections:
-            self._sections = [holder for holder in self._sections if holder is not thread]
+        if thread is self._holder:
+            self._holder = None

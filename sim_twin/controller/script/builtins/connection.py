@@ -7,11 +7,15 @@ import socket
 __all__ = ["Connection"]
 
 _CONNECTING = (errno.EINPROGRESS, errno.EWOULDBLOCK, errno.EALREADY, errno.EINTR)
-_N_RECEIVED_MAX = 1 << 20  # of bytes that nobody reads; beyond it the connection counts as lost
+_N_RECEIVED_MAX = 1 << 16  # bytes, as many as a string may have; what comes then waits with the sender
 
 
 class Connection:
-    """A client's socket and what it has received but not yet handed out. Making one begins to connect."""
+    """A client's socket and what it has received but not yet handed out. Making one begins to connect.
+
+    Raises:
+        OSError: the process has no socket left.
+    """
 
     def __init__(self, address: str, port: int) -> None:
         self._received = bytearray()
@@ -27,7 +31,7 @@ class Connection:
         if not self._is_connected and not self.is_lost:
             try:
                 code = self._socket.connect_ex(self._address)
-            except OverflowError:
+            except (OverflowError, OSError):
                 code = errno.EINVAL
             self._is_connected = code in (0, errno.EISCONN)
             self.is_lost = not self._is_connected and code not in _CONNECTING
@@ -59,6 +63,22 @@ class Connection:
         at = self._received.find(end)
         return self.take(at + len(end)) if at >= 0 else None
 
+    def take_between(self, begin: bytes, end: bytes) -> bytes | None:
+        """Return what stands between two marks and drop it with them and what is before; None while they are not there.
+
+        Without an end it is all that follows.
+        """
+        self._receive()
+        first = self._received.find(begin)
+        last = self._received.find(end, first + len(begin)) if first >= 0 else -1
+        if not end:
+            last = len(self._received)
+        if first < 0 or last < 0 or (not end and last == first + len(begin)):
+            return None
+        taken = bytes(self._received[first + len(begin) : last])
+        del self._received[: last + len(end)]
+        return taken
+
     def take_match(self, pattern: re.Pattern[bytes]) -> bytes | None:
         """Return the first match and drop what stands before it, or None while nothing matches."""
         self._receive()
@@ -80,15 +100,15 @@ class Connection:
         self._socket.close()
 
     def _receive(self) -> None:
-        while self.is_open():
+        while (n_free := _N_RECEIVED_MAX - len(self._received)) > 0 and self.is_open():
             try:
-                chunk = self._socket.recv(65536)
+                chunk = self._socket.recv(n_free)
             except BlockingIOError:
                 return
             except OSError:
                 chunk = b""
             self._received += chunk
-            self.is_lost = not chunk or len(self._received) > _N_RECEIVED_MAX
+            self.is_lost = not chunk
 
     def _is_numeric(self) -> bool:
         """Return whether the address can be used as it stands: to look a name up would block."""

@@ -3,7 +3,16 @@
 from sim_twin.controller.script.arithmetic import int32
 from sim_twin.controller.script.builtins.arguments import flag, integer, text, values
 from sim_twin.controller.script.code import Builtins
-from sim_twin.controller.script.values import MAX_ELEMENTS, Value, copied, described, joined, text_of
+from sim_twin.controller.script.values import (
+    MAX_ELEMENTS,
+    ScriptStruct,
+    Value,
+    checked_size,
+    copied,
+    described,
+    joined,
+    text_of,
+)
 
 __all__ = ["LISTS"]
 
@@ -27,6 +36,11 @@ def _make_list(length: Value, initial_value: Value, capacity: Value = None) -> V
         raise ValueError(f"expected a length of 0 up to the capacity, got {n}")
     if n > MAX_ELEMENTS:
         raise ValueError(f"expected a length of at most {MAX_ELEMENTS}, got {n}")
+    size = checked_size(initial_value)
+    if n * (1 + size) > MAX_ELEMENTS:
+        raise ValueError(f"expected at most {MAX_ELEMENTS} elements in all, got {n} times {1 + size}")
+    if type(initial_value) not in (list, ScriptStruct):
+        return [initial_value] * n
     return [copied(initial_value) for _ in range(n)]
 
 

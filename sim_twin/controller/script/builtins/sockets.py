@@ -18,7 +18,10 @@ from sim_twin.controller.script.code import Builtins
 from sim_twin.controller.script.threads import Wait
 from sim_twin.controller.script.values import Value, text_of
 
-__all__ = ["Sockets"]
+__all__ = ["N_CONNECTIONS", "Sockets"]
+
+N_CONNECTIONS = 32
+"""Of one program; one more is not opened."""
 
 T = TypeVar("T")
 _Waiting: TypeAlias = Generator[Wait, None, T]
@@ -65,7 +68,12 @@ class Sockets:
     def _open(self, address: Value, port: Value, socket_name: Value = _FIRST) -> _Waiting[Value]:
         name = text(socket_name)
         self._close(name)
-        connection = self._connections[name] = Connection(text(address), integer(port))
+        if len(self._connections) >= N_CONNECTIONS:
+            return False
+        try:
+            connection = self._connections[name] = Connection(text(address), integer(port))
+        except OSError:
+            return False
         for _ in range(slices_in(_OPEN_TIMEOUT_S, self._slice_s)):
             if connection.is_open():
                 return True
@@ -126,9 +134,7 @@ class Sockets:
         def take(connection: Connection) -> bytes | None:
             if not begin and not end:
                 return connection.take_any(_N_TEXT_MAX)
-            closing = f"(.*?){re.escape(end)}" if end else "(.+)"
-            whole = connection.take_match(re.compile(f"{re.escape(begin)}{closing}".encode("latin-1"), re.DOTALL))
-            return None if whole is None else whole[len(begin) : len(whole) - len(end)]
+            return connection.take_between(begin.encode("latin-1"), end.encode("latin-1"))
 
         taken = yield from self._await(socket_name, number(timeout), take)
         return (taken or b"").decode("latin-1")
@@ -180,7 +186,7 @@ def _count(value: Value) -> int:
 
 def _floats(listed: str) -> list[Value]:
     found: list[Value] = []
-    for part in listed.split(","):
+    for part in listed.split(",", _N_NUMBERS_MAX)[:_N_NUMBERS_MAX]:
         try:
             found.append(float(part))
         except ValueError:

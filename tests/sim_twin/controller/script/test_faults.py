@@ -41,7 +41,7 @@ from tests.support.scripts import ScriptRun, error_of, program
         ("a = [1, 2]\nwhile True:\n a[0] = a\n a[1] = a\n end", "the list is too long"),
         ("a = [1]\nwhile True:\n a.extend(a)\n end", "the list is too long"),
         ("a = make_list(1000000000, 0)", "at most 10000"),
-        ("a = [1]\nwhile True:\n a = [a]\n end", "nested too deep"),
+        ("a = [1]\nwhile True:\n a = [[[[a]]]]\n sync()\n end", "nested too deep"),
         ("thread t():\n run t()\n end\n run t()\n sync()", "run t: expected at most 100 threads"),
         ("thread t():\n sync()\n sync()\n end\n while True:\n run t()\n end", "run t: expected at most 100 threads"),
         ('kill "a"', "expected a thread's handle after kill"),
@@ -132,30 +132,24 @@ def test_a_loop_that_never_takes_time_is_a_fault_in_its_first_slice(loop):
     assert "sync()" in run.interpreter.error.message
 
 
-def test_the_budget_is_for_each_slice_and_each_thread():
-    body = """
-    thread t():
-        while True:
-            i = 0
-            while i < 25:
-                i = i + 1
-            end
-            sync()
-        end
-    end
-    run t()
-    run t()
-    join run t()
-    """
-    run = ScriptRun(program(body), slice_budget=80).step(50)
-    assert run.interpreter.status is Status.RUNNING
+def counting(n_threads):
+    """A program of threads that each count to 25 in every slice."""
+    body = "while True:\n i = 0\n while i < 25:\n i = i + 1\n end\n sync()\n end"
+    return program(f"thread t():\n{body}\nend\n{'run t()' * n_threads}\njoin run t()".replace(")r", ")\nr"))
+
+
+def test_the_budget_is_for_each_slice_and_for_all_threads_of_a_program_together():
+    assert ScriptRun(counting(2), slice_budget=1000).step(50).interpreter.status is Status.RUNNING
+    many = ScriptRun(counting(20), slice_budget=1000).step()
+    assert many.interpreter.status is Status.FAILED
+    assert "'t' used too much time" in many.interpreter.error.message
 
 
 def test_the_budget_ends_where_it_says():
-    # 1 for the block of the program, 1 for its loop's first test, 2 a round and 1 for the last test: 21 for nine rounds
+    # 7 for the turn, 3 for i = 0 and 1 for the loop; 4 for the first test and for each round 5 and 4
     body = "i = 0\nwhile i < 9:\n i = i + 1\n end"
-    assert ScriptRun(program(body), slice_budget=21).step().interpreter.status is Status.FINISHED
-    assert ScriptRun(program(body), slice_budget=20).step().interpreter.status is Status.FAILED
+    assert ScriptRun(program(body), slice_budget=96).step().interpreter.status is Status.FINISHED
+    assert ScriptRun(program(body), slice_budget=95).step().interpreter.status is Status.FAILED
 
 
 @pytest.mark.parametrize("statement", ["sync()", "sleep(0.1)", 'move("a")', "def f():\n sync()\n end\n f()"])
@@ -177,9 +171,43 @@ def test_a_deep_recursion_through_expressions_is_a_fault_too():
 
 
 def test_a_builtin_that_hands_back_a_generator_must_be_a_generator_function():
-    run = ScriptRun(program("odd()"), odd=lambda: iter_of())
-    with pytest.raises(TypeError, match="declare it as a generator function"):
-        run.step()
+    run = ScriptRun(program("odd()"), odd=lambda: iter_of()).step()
+    assert "declare it as a generator function" in run.interpreter.error.message
+
+
+class OddError(Exception):
+    """What nobody foresaw."""
+
+
+def fails():
+    raise OddError("no room")
+
+
+def fails_slowly():
+    yield
+    raise OddError("no room")
+
+
+def fails_to_end():
+    try:
+        yield
+    finally:
+        raise OddError("no room")
+
+
+@pytest.mark.parametrize("builtin", [fails, fails_slowly])
+def test_whatever_a_builtin_raises_ends_the_program_and_not_the_controller(builtin):
+    run = ScriptRun(program("note(1)\nodd()"), odd=builtin).finish()
+    assert run.interpreter.status is Status.FAILED
+    assert run.interpreter.error.message == "the controller failed at this, not the program: OddError('no room')"
+    assert run.interpreter.error.line == 3
+
+
+def test_what_a_builtin_raises_as_the_program_is_stopped_keeps_no_other_thread_alive():
+    run = ScriptRun(program("thread t():\n odd()\n end\n run t()\n move(1, 9)"), odd=fails_to_end).step()
+    run.interpreter.stop()
+    assert (run.interpreter.status, run.notes) == (Status.FAILED, ["1 begins", "1 ends"])
+    assert "no room" in run.interpreter.error.message
 
 
 def iter_of():

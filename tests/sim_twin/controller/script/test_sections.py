@@ -190,3 +190,56 @@ def test_a_join_inside_a_critical_section_lets_the_joined_thread_end():
         """
     )
     assert [what for _, what in notes] == ["ended", "joined"]
+
+
+def test_a_holder_that_waited_goes_on_once_the_other_has_left_and_none_overlap():
+    waits = """
+    thread {0}():
+        enter_critical
+        join run short()
+        note("{0} in")
+        sync()
+        note("{0} out")
+        exit_critical
+        while True:
+            note("{0}")
+            sync()
+        end
+    end
+    run {0}()
+    """
+    body = f"thread short():\n sleep(0.02)\n end\n{waits.format('a')}{waits.format('b')}\nsleep(0.1)\nnote(0)"
+    notes = [note for _, note in schedule(body, n_max=100)]
+    assert notes[:2] == ["a in", "a out"]
+    assert notes.index("b out") == notes.index("b in") + 1
+    assert min(notes.count("a"), notes.count("b")) > 20
+    assert notes[-1] == 0
+
+
+def test_who_enters_while_the_holder_waits_holds_it_off_until_it_leaves():
+    body = """
+    thread short():
+        sync()
+    end
+    thread a():
+        enter_critical
+        join run short()
+        note("a")
+        exit_critical
+    end
+    thread b():
+        enter_critical
+        note("b in")
+        sleep(0.01)
+        note("b out")
+        exit_critical
+    end
+    run a()
+    sync()
+    run b()
+    sync()
+    note("main")
+    sync()
+    """
+    # b entered while a waited; a's thread ends in slice 2, but a and main wait for b.
+    assert schedule(body) == [(2, "b in"), (7, "b out"), (7, "main"), (7, "a")]

@@ -1,14 +1,17 @@
 """The script's sockets against a real server on the loopback; neither side waits on the clock."""
 
 import math
+import resource
 import socket
 import struct
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
+from time import process_time
 
 import pytest
 
 from sim_twin.controller.script import Status
 from sim_twin.controller.script.builtins import Sockets
+from sim_twin.controller.script.builtins.sockets import N_CONNECTIONS
 from tests.support.scripts import SLICE_S, ScriptRun, program
 
 
@@ -155,3 +158,44 @@ def test_reading_too_many_numbers_is_a_mistake():
     sockets = Sockets(slice_s=SLICE_S)
     run = ScriptRun(program("socket_read_binary_integer(31)"), **sockets.builtins).step()
     assert "expected to read 1 to 30 numbers, got 31" in run.interpreter.error.message
+
+
+def test_a_program_has_so_many_connections_and_one_more_is_not_opened():
+    body = f"""
+    i = 0
+    while i < {N_CONNECTIONS + 3}:
+        note(socket_open("127.0.0.1", port, str_cat("s", i)))
+        i = i + 1
+    end
+    socket_close("s0")
+    note(socket_open("127.0.0.1", port, "again"))
+    """
+    with session(body) as (run, _):
+        run.finish(1500)
+        assert run.notes == [True] * N_CONNECTIONS + [False] * 3 + [True]
+
+
+def test_a_process_without_a_socket_left_opens_none():
+    with session(OPEN) as (run, _):
+        soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+        resource.setrlimit(resource.RLIMIT_NOFILE, (3, hard))
+        try:
+            run.step(2)
+        finally:
+            resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))
+        assert (run.notes, run.interpreter.status) == ([False], Status.FINISHED)
+
+
+def test_what_nobody_reads_waits_with_the_sender_and_is_looked_through_in_no_time():
+    body = OPEN + 'note(socket_read_string(prefix="a", suffix="b", timeout=0.1))\nnote(socket_read_line(timeout=0.1))'
+    with session(body) as (run, server), connected(run, server) as peer:
+        peer.setblocking(False)
+        for _ in range(60):
+            with suppress(BlockingIOError):
+                peer.send(b"a" * 65536)
+            begun = process_time()
+            run.step()
+            # Looked for with a pattern, this took minutes.
+            assert process_time() - begun < 0.1
+        run.finish()
+        assert run.notes == [True, "", ""]
