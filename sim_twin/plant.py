@@ -60,6 +60,7 @@ class TwinWorld:
         self.opening_asked_m = arm.tool.stroke_m
         self.opening_goal_m = arm.tool.stroke_m
         self.grip_speed_m_s = arm.tool.speed_m_s[1]
+        self._grip_force_n = arm.tool.grip_force_n
         self.grip_control = self.model.actuator("grip").id
         self.grip_set_point = self.data.ctrl[self.grip_control : self.grip_control + 1]
         self.stop_speed_rad_s: Array | None = None
@@ -79,6 +80,12 @@ class TwinWorld:
             self._ramp_down(self.stop_speed_rad_s)
         self.table.drive(self.data, self.digital_out)
         self.step_physics(self.model, self.data, self.n_substeps)
+
+    def limit_grip(self, force_n: float) -> None:
+        """Let the hand press with so much at most (N)."""
+        if force_n != self._grip_force_n:
+            self._grip_force_n = force_n
+            self.model.actuator_forcerange[self.grip_control] = (-force_n, force_n)
 
     def begin_stop(self) -> None:
         """Let the set-points run out at a stop's deceleration from the speed that the joints have now."""
@@ -112,6 +119,8 @@ class TwinWorld:
         for address in self.finger_addresses:
             data.qpos[address] = tool.stroke_m / 2
         self.opening_asked_m = self.opening_goal_m = tool.stroke_m
+        self.grip_speed_m_s = tool.speed_m_s[1]
+        self.limit_grip(tool.grip_force_n)
         self.digital_out = digital_out
         self.table.put(data, digital_out)
         mujoco.mj_forward(model, data)
@@ -156,7 +165,6 @@ class TwinArm:
         self._has_object = False
         first = int(world.joint_controls[0])
         self._joint_controls = data.ctrl[first : first + 6]
-        self._grip_force_n = 0.0
 
     def connect(self) -> None:
         """Take the arm; nothing moves."""
@@ -205,9 +213,7 @@ class TwinArm:
         grip = command.grip
         world.opening_goal_m = grip.opening_m
         world.grip_speed_m_s = grip.speed_m_s
-        if grip.force_n != self._grip_force_n:
-            self._grip_force_n = grip.force_n
-            world.model.actuator_forcerange[world.grip_control] = (-grip.force_n, grip.force_n)
+        world.limit_grip(grip.force_n)
         world.digital_out = command.digital_out
 
     def stop(self) -> bool:

@@ -28,6 +28,12 @@ def controller(
     cell: Annotated[
         str, typer.Option("--cell", help="How the table is wired to the control box: a shipped cell's name or a file.")
     ] = "ur_box",
+    plane: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--plane", help="Safety plane nx,ny,nz,offset (base frame, metres): the tool stays on the normal's side."
+        ),
+    ] = None,
     script: Annotated[Path | None, typer.Option("--script", help="URScript file to run at the start.")] = None,
     program: Annotated[
         list[Path] | None,
@@ -39,6 +45,7 @@ def controller(
         return
     from config.errors import ConfigError
     from robot.realtime import take_priority
+    from sim_twin.controller.planes import parse_plane
     from sim_twin.controller.server import PRIORITY, ControllerServer, Setup
 
     try:
@@ -54,6 +61,7 @@ def controller(
             shelf={path.name: path.read_text(encoding="utf-8") for path in program or []},
             bus=bus,
             cell=cell,
+            planes=tuple(map(parse_plane, plane or [])),
         )
         server = ControllerServer(setup)
         with server:

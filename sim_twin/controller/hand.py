@@ -68,7 +68,12 @@ class Hand:
         self._n_still = 0
 
     def open(self) -> None:
-        """Stand open, as after a reset of the table; an active gripper stays active."""
+        """Stand open, as after a reset of the table. An active gripper stays active.
+
+        An activation under way is over and done: its strokes would go on over a table that they were not begun on.
+        """
+        if self._status == ACTIVATING:
+            self._status, self._strokes = ACTIVE, []
         self._request = msgspec.structs.replace(self._request, pos=0)
         self._n_still, self._held = 0, MOVING
         self._world.opening_goal_m = self._tool.stroke_m
@@ -126,8 +131,7 @@ class Hand:
         slowest, fastest = tool.speed_m_s
         world.grip_speed_m_s = slowest + (fastest - slowest) * speed / SHUT
         weakest, strongest = tool.force_n
-        force_n = weakest + (strongest - weakest) * force / SHUT
-        world.model.actuator_forcerange[world.grip_control] = (-force_n, force_n)
+        world.limit_grip(weakest + (strongest - weakest) * force / SHUT)
 
     def _holding(self) -> int:
         """Return whether something keeps the fingers from where they are asked to be; a short stir loses nothing."""

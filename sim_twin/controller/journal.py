@@ -4,18 +4,23 @@ from collections import deque
 from collections.abc import Callable
 
 from sim_twin.controller.script.builtins import Popup
+from sim_twin.controller.states import SafetyMode
 from sim_twin.controller.wire.primary_messages import (
     ReportLevel,
     pack_error_code,
     pack_key,
     pack_popup,
     pack_runtime_exception,
+    pack_safety_mode,
     pack_text,
 )
 
 __all__ = ["Journal"]
 
 N_LINES = 1000
+_UNKNOWN = (0, 0)
+_STOPS = frozenset(SafetyMode) - {SafetyMode.NORMAL, SafetyMode.REDUCED, SafetyMode.RECOVERY}
+_LEVELS = {SafetyMode.VIOLATION: ReportLevel.VIOLATION, SafetyMode.FAULT: ReportLevel.FAULT}
 
 
 class Journal:
@@ -27,6 +32,7 @@ class Journal:
     Attributes:
         lines: The log's last lines, each (stamp in µs, text).
         outbox: Robot messages as bytes; whoever owns the ports takes them.
+        safety_mode: As it was last told.
         popup: What a person is asked to read, None where nothing is.
     """
 
@@ -35,6 +41,8 @@ class Journal:
         self.lines: deque[tuple[int, str]] = deque(maxlen=N_LINES)
         self.outbox: deque[bytes] = deque(maxlen=N_LINES)
         self.popup: Popup | None = None
+        self.safety_mode = SafetyMode.NORMAL
+        self._why: tuple[int, int] | None = None
 
     def note(self, text: str) -> None:
         """Write a line to the log."""
@@ -78,7 +86,26 @@ class Journal:
         self.outbox.append(pack_runtime_exception(line, column, text, stamp_us=self._stamp_us()))
 
     def error(self, code: int, argument: int, text: str, *, is_violation: bool = False) -> None:
-        """Say why the robot stopped."""
+        """Say why the robot stops; the change of the safety mode that follows is told with the same code."""
         self.note(f"C{code}A{argument}: {text}")
-        level = ReportLevel.VIOLATION if is_violation else ReportLevel.WARNING
+        self._report(code, argument, text, ReportLevel.VIOLATION if is_violation else ReportLevel.WARNING)
+        self._why = code, argument
+
+    def safety(self, mode: SafetyMode) -> None:
+        """Take the safety mode, and say so where it is another one.
+
+        A stop for which nobody gave a reason is an error too, of code 0: UR's numbers for them are not known.
+        """
+        why, self._why = self._why, None
+        if mode is self.safety_mode:
+            return
+        self.safety_mode = mode
+        text = f"safety mode changed to {mode.name}"
+        self.note(text)
+        if why is None and mode in _STOPS:
+            self._report(*_UNKNOWN, text, _LEVELS.get(mode, ReportLevel.WARNING))
+        code, argument = why or _UNKNOWN
+        self.outbox.append(pack_safety_mode(code, argument, stamp_us=self._stamp_us(), safety_mode=mode))
+
+    def _report(self, code: int, argument: int, text: str, level: ReportLevel) -> None:
         self.outbox.append(pack_error_code(code, argument, stamp_us=self._stamp_us(), level=level, text=text))

@@ -6,9 +6,10 @@ from sim_twin.controller.io import InputsOutputs
 from sim_twin.controller.journal import Journal
 from sim_twin.controller.modes import Modes
 from sim_twin.controller.motion import SLICE_S, TwinDrive
+from sim_twin.controller.motion.limits import Cause
 from sim_twin.controller.motion.poses import Array
 from sim_twin.controller.registers import Registers
-from sim_twin.controller.states import Event
+from sim_twin.controller.states import Event, SafetyMode
 from sim_twin.controller.watchdogs import Watchdogs
 from sim_twin.controller.wire import ControllerVersion, Value
 from sim_twin.plant import TwinWorld
@@ -107,6 +108,14 @@ class Machine:
         """Put back what holds for one program only."""
         self.force_damping, self.force_gain = 0.025, 1.0
         self.watchdogs.clear()
+
+    def note_safety(self, event: Event, joint: int | None) -> None:
+        """Say what the safety mode is after an event, to the log and on the primary port."""
+        safety, worn_out = self.modes.safety, Cause.TOO_MANY_STOPS
+        is_new = safety is not self.journal.safety_mode
+        if is_new and event is Event.PROTECTIVE_STOP and joint is not None and safety is SafetyMode.FAULT:
+            self.journal.error(worn_out.code, joint, f"joint {joint}: too many protective stops", is_violation=True)
+        self.journal.safety(safety)
 
     def post(self, event: Event) -> None:
         """Let an event happen at the end of the programs' slice."""

@@ -7,13 +7,13 @@ import numpy as np
 
 from sim_twin.controller.builtins.state import JOINT_C
 from sim_twin.controller.machine import Machine
-from sim_twin.controller.motion import DhRow
+from sim_twin.controller.motion import DhRow, Measured
 from sim_twin.controller.motion.poses import Array
 from sim_twin.controller.program import Programs
 from sim_twin.controller.states import RobotMode
 from sim_twin.controller.wire import Outputs, Value
 
-__all__ = ["BUS_V", "COPIES", "JOINT_V", "elbow", "joint_mode", "make_outputs"]
+__all__ = ["BUS_V", "COPIES", "JOINT_V", "elbow", "elbow_velocity", "joint_mode", "make_outputs", "robot_current_a"]
 
 Getters = dict[str, Callable[[], Value]]
 BUS_V, JOINT_V = 48.0, 48.0
@@ -96,6 +96,18 @@ def elbow(rows: tuple[DhRow, ...], q_rad: Array) -> tuple[float, float, float]:
     )
 
 
+def elbow_velocity(rows: tuple[DhRow, ...], q_rad: Array, qd_rad_s: Array) -> tuple[float, float, float]:
+    """Return how fast the elbow moves, base axes (m/s).  (6,), (6,) -> (3,)"""
+    x, y, z = elbow(rows, q_rad)
+    u, v, w = elbow(rows, q_rad + qd_rad_s * _STEP_S)
+    return (u - x) / _STEP_S, (v - y) / _STEP_S, (w - z) / _STEP_S
+
+
+def robot_current_a(measured: Measured) -> float:
+    """Return what the arm draws: the sum of its joints' currents, without their signs (A)."""
+    return sum(map(abs, measured.current_a.tolist()))
+
+
 def _asked(machine: Machine) -> Getters:
     setpoint = machine.drive.motions.setpoint
     return {
@@ -109,13 +121,7 @@ def _asked(machine: Machine) -> Getters:
 
 def _measured(machine: Machine) -> Getters:
     drive = machine.drive
-    rows = drive.kinematics.rows
-
-    def elbow_velocity() -> list[float]:
-        q, qd = drive.measured.q_rad, drive.measured.qd_rad_s
-        after, before = elbow(rows, q + qd * _STEP_S), elbow(rows, q)
-        return [(b - a) / _STEP_S for a, b in zip(before, after, strict=True)]
-
+    kinematics = drive.kinematics
     return {
         "actual_q": lambda: drive.measured.q_rad.tolist(),
         "actual_qd": lambda: drive.measured.qd_rad_s.tolist(),
@@ -124,9 +130,9 @@ def _measured(machine: Machine) -> Getters:
         "actual_TCP_pose": lambda: drive.measured.tcp_pose.tolist(),
         "actual_TCP_speed": lambda: drive.measured.tcp_speed.tolist(),
         "actual_tool_accelerometer": machine.tool_acceleration,
-        "actual_robot_current": lambda: float(np.abs(drive.measured.current_a).sum()),
-        "elbow_position": lambda: elbow(rows, drive.measured.q_rad),
-        "elbow_velocity": elbow_velocity,
+        "actual_robot_current": lambda: robot_current_a(drive.measured),
+        "elbow_position": lambda: elbow(kinematics.rows, drive.measured.q_rad),
+        "elbow_velocity": lambda: elbow_velocity(kinematics.rows, drive.measured.q_rad, drive.measured.qd_rad_s),
     }
 
 

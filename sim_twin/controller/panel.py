@@ -1,10 +1,14 @@
 """The robot as the dashboard and the state ports see it."""
 
+import struct
+import zlib
+
 from sim_twin.controller.builtins.state import CONTROLLER_C, JOINT_C
 from sim_twin.controller.machine import Machine
 from sim_twin.controller.modes import Modes
+from sim_twin.controller.motion import DhRow
 from sim_twin.controller.motion.poses import Array
-from sim_twin.controller.outputs import elbow, joint_mode
+from sim_twin.controller.outputs import elbow, elbow_velocity, joint_mode, robot_current_a
 from sim_twin.controller.program import UNNAMED, Programs
 from sim_twin.controller.script.builtins import Popup
 from sim_twin.controller.states import Event, RobotMode, RuntimeState, SafetyMode
@@ -35,7 +39,10 @@ _STATES = {
 _STARTED = {True: Outcome.DONE, False: Outcome.FAILED, None: None}
 _ESTOPS = (SafetyMode.SYSTEM_EMERGENCY_STOP, SafetyMode.ROBOT_EMERGENCY_STOP)
 _JOINTS_C: Vec6 = (JOINT_C, JOINT_C, JOINT_C, JOINT_C, JOINT_C, JOINT_C)
-_CHECKSUM = (0x1, 0x2, 0x3, 0x4, 0x5, 0x6)
+_ROW = struct.Struct(">4d")
+_NOT_CALIBRATED, _CALIBRATED = 0, 2
+"""UR's controller calls them "not initialised" and "linearised"; 1 is "not linearised"."""
+_POSITION, _TEACH, _FORCE = 0, 1, 2
 
 
 class Panel:
@@ -191,7 +198,12 @@ class Panel:
                 motor_temperature_c=_JOINTS_C,
                 mode=(mode, mode, mode, mode, mode, mode),
             ),
-            tool=ToolData(output_voltage_v=io.tool_voltage_v, temperature_c=JOINT_C, mode=mode),
+            tool=ToolData(
+                analog_inputs=(io.tool_analog_in[0], io.tool_analog_in[1]),
+                output_voltage_v=io.tool_voltage_v,
+                temperature_c=JOINT_C,
+                mode=mode,
+            ),
             masterboard=MasterboardData(
                 digital_inputs=io.digital_in,
                 digital_outputs=io.digital_out,
@@ -200,6 +212,7 @@ class Panel:
                 analog_output_domains=(io.analog_out_domain[0], io.analog_out_domain[1]),
                 analog_outputs=(io.analog_output(0), io.analog_output(1)),
                 temperature_c=CONTROLLER_C,
+                robot_current_a=robot_current_a(measured),
                 safety_mode=int(machine.modes.safety),
                 is_reduced=machine.modes.is_reduced,
             ),
@@ -216,7 +229,7 @@ class Panel:
         drive, modes, io = machine.drive, machine.modes, machine.io
         measured, setpoint = drive.measured, drive.motions.setpoint
         pose, speed = machine.target_tool()
-        cog, mode = drive.payload[1], joint_mode(machine)
+        cog, mode, rows = drive.payload[1], joint_mode(machine), drive.kinematics.rows
         return RealtimeState(
             time_s=machine.time_s,
             q_target_rad=_six(setpoint.q_target),
@@ -235,7 +248,7 @@ class Panel:
             tcp_speed_target=_vec6(speed),
             digital_inputs=io.digital_in,
             motor_temperature_c=_JOINTS_C,
-            controller_timer_s=machine.execution_s,
+            controller_timer_ms=machine.execution_s * 1e3,
             robot_mode=int(modes.robot),
             joint_modes=(mode, mode, mode, mode, mode, mode),
             safety_mode=int(modes.safety),
@@ -243,7 +256,9 @@ class Panel:
             speed_scaling=drive.core.pace.scale,
             digital_outputs=io.digital_out,
             program_state=int(modes.runtime),
-            elbow_position_m=elbow(drive.kinematics.rows, measured.q_rad),
+            robot_current_a=robot_current_a(measured),
+            elbow_position_m=elbow(rows, measured.q_rad),
+            elbow_velocity_m_s=elbow_velocity(rows, measured.q_rad, measured.qd_rad_s),
             safety_status=int(modes.safety),
             payload_kg=drive.payload[0],
             payload_cog_m=(float(cog[0]), float(cog[1]), float(cog[2])),
@@ -261,18 +276,25 @@ class Panel:
             is_program_running=modes.runtime in (RuntimeState.PLAYING, RuntimeState.RESUMING),
             is_program_paused=modes.runtime in (RuntimeState.PAUSED, RuntimeState.PAUSING),
             robot_mode=int(modes.robot),
+            control_mode=self._control_mode(),
             target_speed_fraction=pace.slider,
             speed_scaling=pace.scale,
         )
 
+    def _control_mode(self) -> int:
+        core = self._machine.drive.core
+        return _TEACH if core.is_free else _POSITION if core.force_task is None else _FORCE
+
     def _kinematics_info(self) -> KinematicsInfo:
-        rows = self._machine.drive.kinematics.rows
+        kinematics = self._machine.drive.kinematics
+        rows = kinematics.rows
         return KinematicsInfo(
-            checksum=_CHECKSUM,
+            checksum=_checksum(rows),
             dh_theta_rad=_vec6([r.theta_rad for r in rows]),
             dh_a_m=_vec6([r.a_m for r in rows]),
             dh_d_m=_vec6([r.d_m for r in rows]),
             dh_alpha_rad=_vec6([r.alpha_rad for r in rows]),
+            calibration_status=_NOT_CALIBRATED if rows == kinematics.nominal else _CALIBRATED,
         )
 
     def _configuration(self) -> ConfigurationData:
@@ -285,6 +307,12 @@ class Panel:
             dh_d_m=_vec6([j.d_m for j in joints]),
             dh_alpha_rad=_vec6([j.alpha_rad for j in joints]),
         )
+
+
+def _checksum(rows: tuple[DhRow, ...]) -> tuple[int, int, int, int, int, int]:
+    """Return a number a row that tells it from others; how UR finds its own is not public."""
+    a, b, c, d, e, f = (zlib.crc32(_ROW.pack(r.theta_rad, r.a_m, r.d_m, r.alpha_rad)) for r in rows)
+    return a, b, c, d, e, f
 
 
 def _vec6(values: list[float] | tuple[float, ...]) -> Vec6:

@@ -63,6 +63,7 @@ class Programs:
     def handle(self, event: Event, *, joint: int | None = None) -> Reaction:
         """Let an event happen: modes, arm and program."""
         reaction = self._machine.modes.handle(event, joint=joint)
+        self._machine.note_safety(event, joint)
         self.obey(reaction)
         return reaction
 

@@ -18,6 +18,7 @@ from sim_twin.controller.control_port import CONTROL, ControlPort
 from sim_twin.controller.faults import Faults
 from sim_twin.controller.motion import SLICE_S
 from sim_twin.controller.pacing import Pacer
+from sim_twin.controller.planes import PlaneNumbers, planes_of
 from sim_twin.controller.robot import VirtualRobot, make_world
 from sim_twin.controller.ticks import TickTimes
 from sim_twin.controller.trace import TraceWriter
@@ -51,6 +52,8 @@ class Setup(msgspec.Struct, frozen=True, kw_only=True):
     """Texts of programs that the dashboard can load, by the name that it loads them by."""
     cell: str = ""
     """A shipped cell's name or a path: how the table is wired to the control box; straight through where empty."""
+    planes: tuple[PlaneNumbers, ...] = ()
+    """Safety planes of the installation: normal (base frame) and offset along it (m); the tool stays on its side."""
     bus: str = ""
     """Zenoh endpoint to listen on: the twin's truth, and resets of its table."""
     trace: str = ""
@@ -89,7 +92,7 @@ class ControllerServer:
         ticks: What slices cost.
 
     Raises:
-        ValueError: the host is no loopback address and that is not allowed, or the version is none.
+        ValueError: the host is no loopback address and that is not allowed, or the version or a plane is none.
     """
 
     def __init__(self, setup: Setup) -> None:
@@ -100,6 +103,7 @@ class ControllerServer:
             )
         self.setup = setup
         version = parse_version(setup.version)
+        planes = planes_of(setup.planes)
         world = make_world(scenario=setup.scenario, seed=setup.seed)
         cell = load_cell(setup.cell) if setup.cell else None
         if cell is not None:
@@ -107,6 +111,8 @@ class ControllerServer:
         self.robot = robot = VirtualRobot(
             world, version=version, is_powered=setup.is_powered, cell=cell, compiler=ThreadCompiler
         )
+        drive = robot.machine.drive
+        drive.limits = msgspec.structs.replace(drive.limits, planes=planes)
         robot.programs.shelf.update(setup.shelf)
         self.wires = Wires(
             outputs=robot.outputs,

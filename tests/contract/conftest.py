@@ -1,13 +1,10 @@
 """What the contract suites share: rigs, and a repeat on a stalled machine."""
 
-import os
-from contextlib import suppress
-from pathlib import Path
-
 import pytest
 from _pytest.runner import runtestprotocol
 
 from tests.support.contract_rigs import WORLDS, open_world
+from tests.support.overbooked import waited_s
 
 OPENED = pytest.StashKey[object]()
 """The world that was opened last; None where the last did not open."""
@@ -42,21 +39,21 @@ def pytest_runtest_protocol(item, nextitem):
         return None
     item.ihook.pytest_runtest_logstart(nodeid=item.nodeid, location=item.location)
     for attempt in range(1, N_ATTEMPTS + 1):
-        before_s = _waited_s()
+        before_s = waited_s()
         reports = runtestprotocol(item, nextitem=nextitem, log=False)
-        waited_s = _waited_s() - before_s
+        stalled_s = waited_s() - before_s
         opened = item.config.stash.get(OPENED, None)
         is_repeatable = opened is not None and any(report.failed for report in reports)
-        if attempt == N_ATTEMPTS or waited_s < STALL_S or not is_repeatable:
+        if attempt == N_ATTEMPTS or stalled_s < STALL_S or not is_repeatable:
             break
         item.config.stash.setdefault(REPEATED, []).append(
-            f"{item.nodeid} (the machine was overbooked for {waited_s:.3f} s)"
+            f"{item.nodeid} (the machine was overbooked for {stalled_s:.3f} s)"
         )
         opened.renew()
         item._initrequest()
     for report in reports:
         if attempt > 1:
-            report.sections.append(("stalls", f"attempt {attempt}; the machine was overbooked for {waited_s:.3f} s"))
+            report.sections.append(("stalls", f"attempt {attempt}; the machine was overbooked for {stalled_s:.3f} s"))
         item.ihook.pytest_runtest_logreport(report=report)
     item.ihook.pytest_runtest_logfinish(nodeid=item.nodeid, location=item.location)
     return True
@@ -65,15 +62,3 @@ def pytest_runtest_protocol(item, nextitem):
 def pytest_terminal_summary(terminalreporter, config):
     for told in config.stash.get(REPEATED, []):
         terminalreporter.write_line(f"repeated on a stalled machine: {told}")
-
-
-def _waited_s():
-    """Return how long somebody on this machine has been ready to run and did not, or its host ran something else."""
-    waited_s = 0.0
-    with suppress(OSError, ValueError, IndexError):
-        steal = Path("/proc/stat").read_text().split("\n", 1)[0].split()[8]
-        waited_s += int(steal) / os.sysconf("SC_CLK_TCK")
-    with suppress(OSError, ValueError, IndexError):
-        some = Path("/proc/pressure/cpu").read_text().split("\n", 1)[0]
-        waited_s += int(some.rsplit("total=", 1)[1]) * 1e-6
-    return waited_s

@@ -15,7 +15,7 @@ from tests.contract import conftest as suite
 from tests.contract.conftest import *  # noqa: F403
 
 now = count()
-suite._waited_s = lambda: float(next(now))
+suite.waited_s = lambda: float(next(now))
 
 
 class Shut:

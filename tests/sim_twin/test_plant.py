@@ -235,3 +235,29 @@ def test_a_stop_goes_on_holding_what_is_held(resolved):
         arm.clock.wait_tick()
     assert arm.read().grip.has_object
     assert np.linalg.norm(np.subtract(poses(plant)[name], arm.read().tcp_position_m)) < 0.02
+
+
+def test_a_reset_leaves_nothing_of_a_hard_and_slow_grip_bit_for_bit(resolved):
+    """The model is changed as the hand presses; a plant that never did is the measure."""
+
+    def closing(plant: TwinPlant) -> list[bytes]:
+        world = plant.world
+        plant.resetter.reset(seed=2, epoch=7, digital_out=0)
+        model = np.zeros(mujoco.mj_sizeModel(world.model), dtype=np.uint8)
+        mujoco.mj_saveModel(world.model, None, model)
+        seen = [model.tobytes()]
+        world.opening_goal_m = 0.0
+        for _ in range(80):
+            plant.arm.clock.wait_tick()
+            seen.append(world.data.qpos.tobytes() + world.data.qvel.tobytes())
+        return seen
+
+    used, fresh = make(resolved), make(resolved)
+    used.arm.connect()
+    tool = resolved.arm.tool
+    grip = GripCommand(opening_m=0.0, force_n=tool.force_n[1], speed_m_s=tool.speed_m_s[0])
+    q_rad = resolved.arm.home_rad
+    for k in range(50):
+        used.arm.write(ArmCommand(stamp_ns=0, sequence=k, q_rad=q_rad, grip=grip, digital_out=0))
+        used.arm.clock.wait_tick()
+    assert closing(used) == closing(fresh)

@@ -3,7 +3,8 @@
 The words are those of UR's dashboard pages and of what public clients match on. Where those pages know one reply to a
 command, it is given whether or not the arm follows: `power on` to an arm that runs is answered "Powering on" and
 changes nothing (Universal_Robots_Client_Library, pull request 397). In local control the commands that act are refused,
-and a connection that was made in local control stays refused: UR asks for a reconnect, so does this.
+in the words that public projects quote from robots, and a connection that was made in local control stays refused:
+UR asks for a reconnect, so does this.
 """
 
 from collections import deque

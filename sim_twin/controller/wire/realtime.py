@@ -48,7 +48,7 @@ class RealtimeState(msgspec.Struct, frozen=True, kw_only=True):
     tcp_speed_target: Vec6 = _ZERO
     digital_inputs: int = 0
     motor_temperature_c: Vec6 = _ZERO
-    controller_timer_s: float = 0.0
+    controller_timer_ms: float = 0.0
     robot_mode: int = 7
     joint_modes: tuple[int, int, int, int, int, int] = (253, 253, 253, 253, 253, 253)
     safety_mode: int = 1
@@ -111,7 +111,7 @@ def _numbers(s: RealtimeState) -> tuple[float, ...]:
         *s.tcp_speed_target,
         s.digital_inputs,
         *s.motor_temperature_c,
-        s.controller_timer_s,
+        s.controller_timer_ms,
         unused,
         s.robot_mode,
         *s.joint_modes,

@@ -55,7 +55,7 @@ class _Client:
         self.output: Recipe | None = None
         self.getters: list[tuple[Callable[[], Value], bool]] = []
         self.inputs: dict[int, Recipe] = {}
-        self.divider = 1
+        self.rate_hz = 0.0
         self.is_started = False
 
     def package(self) -> bytes:
@@ -81,6 +81,8 @@ class RtdeServer:
         self._outputs = outputs
         self._sink = inputs
         self._version = version
+        self._slices_a_cycle = round(_STEP_HZ / _OLD_HZ) if version.is_cb3 else 1
+        self._fastest_hz = _STEP_HZ / self._slices_a_cycle
         known = output_fields(version)
         self._output_kinds = {name: kind for name, kind in known.items() if name in outputs}
         self._input_kinds = input_fields(version)
@@ -129,9 +131,12 @@ class RtdeServer:
         self._owner_by_input = {name: owner for name, owner in self._owner_by_input.items() if owner is not peer}
 
     def tick(self, control_step: int) -> None:
-        """Send each started client its package if this 2 ms step is one of its own."""
+        """Send each started client its package if one came due with this 2 ms step."""
+        n_cycles, slices_left = divmod(control_step, self._slices_a_cycle)
+        if slices_left:
+            return
         for client in tuple(self._clients.values()):
-            if client.is_started and control_step % client.divider == 0:
+            if client.is_started and self._is_due(n_cycles, client.rate_hz):
                 client.peer.stream(client.package())
 
     def say(self, message: str, *, level: Level = Level.INFO, source: str = _SOURCE) -> None:
@@ -178,7 +183,7 @@ class RtdeServer:
         else:
             client.output = Recipe(names, found, recipe_id=1 if client.protocol > 1 else None)
             client.getters = [(self._outputs[n], k.n_items > 1) for n, k in zip(names, found, strict=True)]
-            client.divider = self._divider(rate_hz)
+            client.rate_hz = self._pace_hz(rate_hz)
         self._confirm(client, Kind.OUTPUTS, int(client.output is not None), [kind or "NOT_FOUND" for kind in kinds])
 
     def _set_inputs(self, client: _Client, payload: bytes) -> None:
@@ -202,12 +207,14 @@ class RtdeServer:
             # After the reply: ur_rtde takes whatever comes next for it.
             self._say_to(client, f"expected 1 to {_N_NAMES_BYTES} bytes of field names, set up fewer", Level.ERROR)
 
-    def _divider(self, rate_hz: float) -> int:
-        """Return how many 2 ms steps lie between two packages; no sensible rate means the fastest."""
-        fastest = round(_STEP_HZ / _OLD_HZ) if self._version.is_cb3 else 1
-        if not math.isfinite(rate_hz) or rate_hz <= 0.0:
-            return fastest
-        return max(fastest, round(min(_STEP_HZ / rate_hz, 1e6)))
+    def _pace_hz(self, rate_hz: float) -> float:
+        """Return the rate that a client gets; no sensible rate means the fastest."""
+        is_sensible = math.isfinite(rate_hz) and rate_hz > 0.0
+        return min(rate_hz, self._fastest_hz) if is_sensible else self._fastest_hz
+
+    def _is_due(self, n_cycles: int, rate_hz: float) -> bool:
+        """Return whether a package came due with this cycle: none is early, none a whole cycle late."""
+        return n_cycles * rate_hz // self._fastest_hz > (n_cycles - 1) * rate_hz // self._fastest_hz
 
     def _start(self, client: _Client, _payload: bytes) -> None:
         client.is_started = client.output is not None

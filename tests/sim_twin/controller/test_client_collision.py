@@ -55,3 +55,17 @@ def test_an_arm_that_is_servoed_into_the_table_is_stopped_by_the_contact_force_a
         felt = re.fullmatch(r"C158A0: collision detected at the tool: (\d+) N", told[0])
         assert felt is not None, told
         assert FORCE_LIMIT_N <= float(felt[1]) <= VIOLATION_N
+
+
+def test_a_safety_plane_stops_an_arm_that_the_client_drives_through_it():
+    with make_station(own_address(), planes=((0.0, 0.0, 1.0, 0.1),)) as station:
+        control, receive = station.control, station.receive
+        above = station.pose
+        below = [*above[:2], 0.02, *above[3:]]
+        assert above[2] > 0.15
+        assert not control.moveL(below, 0.25, 1.2)
+        assert until(receive.isProtectiveStopped)
+        station.rest()
+        assert 0.06 < station.pose[2] < 0.101
+        told = [line for line in station.process.fault("log")["lines"] if re.match(r"C\d", line)]
+        assert told == ["C152A0: target position is beyond a safety plane"]

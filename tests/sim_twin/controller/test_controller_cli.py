@@ -40,6 +40,7 @@ def test_a_controller_says_that_it_is_ready_and_ends_cleanly(tmp_path):
     shelved = tmp_path / "b.script"
     shelved.write_text("def g():\n set_digital_out(3, True)\nend\n")
     command = [*RUN, "--host", "127.0.0.10", "--version", "5.23.0", "--script", str(script), "--program", str(shelved)]
+    command += ["--plane", "0,0,1,0.01", "--plane", "-1,0,0,-2"]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as running:
         assert running.stdout.readline() == "virtual UR5e 5.23.0 ready on 127.0.0.10\n"
         time.sleep(0.3)
@@ -54,6 +55,14 @@ def test_a_controller_says_that_it_is_ready_and_ends_cleanly(tmp_path):
     assert running.returncode == 0, err
     assert out == "stopped\n"
     assert not err
+
+
+@pytest.mark.parametrize("plane", ["0,0,1", "a,b,c,d", "0,0,0,0.1", "0,0,1,inf", ""])
+def test_a_plane_that_is_none_is_refused_in_one_line(plane):
+    result = CliRunner().invoke(app, ["--host", "127.0.0.10", "--plane", plane])
+    assert result.exit_code == 2
+    assert result.output.startswith("error: plane: expected")
+    assert result.output.count("\n") == 1
 
 
 def test_an_address_that_others_can_reach_is_refused():

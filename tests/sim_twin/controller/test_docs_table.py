@@ -11,9 +11,13 @@ from sim_twin.controller.builtins.versions import ANY, SINCE
 from sim_twin.controller.control_port import CONTROL
 from sim_twin.controller.outputs import COPIES
 from sim_twin.controller.script.builtins import Sockets
+from sim_twin.controller.states import Event
 from sim_twin.controller.wire import ControllerVersion
 from sim_twin.controller.wire.dashboard import DashboardServer
+from sim_twin.controller.wire.primary_messages import _Type
+from sim_twin.controller.wire.primary_state import PrimaryState
 from sim_twin.controller.wire.rtde_codec import Kind
+from sim_twin.controller.wire.state_ports import StatePorts
 from sim_twin.controller.wire.wires import Wires
 from tests.support.virtual_robot import make_robot
 
@@ -138,3 +142,31 @@ def test_every_port_that_listens_is_in_the_table(robot):
     wires.close()
     there = [row[0] for row in rows("Ports") if not row[-1].startswith("absent")]
     assert {int(port) for ports in there for port in re.findall(r"\d+", ports)} == {*opened, CONTROL}
+
+
+ROBOT_STATE, ROBOT_MESSAGE = 16, 20
+
+
+def test_every_primary_message_is_in_the_table_and_what_is_there_is_sent():
+    robot = make_robot()
+    ports = StatePorts(states=robot.panel, scripts=robot, version=ControllerVersion(), stamp_us=lambda: 0)
+    sent = [ports.primary._greet()]
+    for body in ('textmsg("a")', 'popup("a", "b", blocking=False)', "movej([1, 2])"):
+        robot.submit_script(f"def f():\n {body}\n sync()\nend\n")
+        for _ in range(20):
+            robot.step()
+    robot.programs.handle(Event.PROTECTIVE_STOP)
+    sent += robot.machine.journal.outbox
+    assert {message[4] for message in sent} == {ROBOT_MESSAGE}
+    there = [row[0] for row in rows("Primary messages") if not row[-1].startswith("absent")]
+    told = {int(number) for names in there for number in re.findall(r"\((\d+)\)", names)}
+    assert told == {message[14] for message in sent} | {ROBOT_STATE}
+    assert told == {*_Type, ROBOT_STATE}
+
+
+def test_every_part_of_the_robot_state_is_in_the_table_and_sent(robot):
+    (told,) = [row[0] for row in rows("Primary messages") if f"({ROBOT_STATE})" in row[0]]
+    parts = [part.removeprefix("robot ").removesuffix(" info") for part in told.split("sub-packages ")[1].split(", ")]
+    assert [part.replace(" ", "_") for part in parts] == list(PrimaryState.__struct_fields__)
+    state = robot.panel.primary_state()
+    assert [part for part in PrimaryState.__struct_fields__ if getattr(state, part) is None] == []

@@ -125,3 +125,38 @@ def test_fingers_that_are_told_to_go_no_further_stand():
     run(robot, 300)
     assert standing_m < 0.075
     assert robot.hand.opening_m == pytest.approx(standing_m, abs=1e-3)
+
+
+def laid_out(robot):
+    robot.lay_out(seed=1, epoch=2, digital_out=0)
+    world = robot.machine.world
+    return world.model.actuator_forcerange.tobytes(), world.grip_speed_m_s, world.opening_goal_m
+
+
+def test_a_reset_of_the_table_leaves_nothing_of_a_hard_grip_and_the_hand_active():
+    robot = make_robot()
+    robot.hand.request(GripperRequest(act=1))
+    settle(robot)
+    robot.hand.request(GripperRequest(act=1, gto=1, pos=255, spe=0, force=255))
+    run(robot, 20)
+    assert laid_out(robot) == laid_out(make_robot())
+    assert robot.hand.measure().sta == 3
+
+
+def test_a_reset_of_the_table_ends_an_activation_and_no_stroke_follows():
+    robot = make_robot()
+    robot.hand.request(GripperRequest(act=1))
+    run(robot, 100)
+    assert robot.hand.measure().sta == 1
+    laid_out(robot)
+    for _ in range(1000):
+        assert robot.hand.measure().sta == 3
+        assert robot.hand.opening_m > 0.083
+        robot.step()
+
+
+def test_a_reset_of_the_table_activates_no_hand():
+    robot = make_robot()
+    laid_out(robot)
+    run(robot, 100)
+    assert robot.hand.measure().sta == 0

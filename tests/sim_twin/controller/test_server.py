@@ -4,6 +4,8 @@ import pytest
 
 from sim_twin.controller.pacing import Pacer
 from sim_twin.controller.server import ControllerServer, Setup, parse_version
+from sim_twin.controller.states import SafetyMode
+from tests.support.virtual_robot import lines, run
 
 
 def test_a_slept_through_slot_is_skipped_and_counted():
@@ -34,3 +36,27 @@ def test_a_version_is_numbers(text):
     with pytest.raises(ValueError, match="version"):
         parse_version(text)
     assert str(parse_version("5.23.1")).startswith("5.23.1.")
+
+
+def test_a_plane_of_the_set_up_stops_the_tool_that_is_driven_through_it():
+    server = ControllerServer(Setup(planes=((0.0, 0.0, 2.0, 0.1),)))
+    robot = server.robot
+    run(robot, 2)
+    above = robot.machine.drive.measured.tcp_pose
+    assert above[2] > 0.15
+    below = [*above[:2].tolist(), 0.02, *above[3:].tolist()]
+    robot.submit_script(f"def f():\n movel(p{below}, a=1.2, v=0.25)\nend\n")
+    run(robot, 1000, lambda: robot.machine.modes.safety is SafetyMode.PROTECTIVE_STOP)
+    run(robot, 250)
+    assert robot.machine.drive.is_standing
+    assert 0.06 < robot.machine.drive.measured.tcp_pose[2] < 0.101
+    assert [line for line in lines(robot) if line.startswith("C")] == [
+        "C152A0: target position is beyond a safety plane"
+    ]
+    server.close()
+
+
+@pytest.mark.parametrize("plane", [(0.0, 0.0, 0.0, 0.1), (0.0, float("nan"), 1.0, 0.1), (0.0, 0.0, 1.0, float("inf"))])
+def test_a_plane_without_a_normal_or_a_place_is_refused(plane):
+    with pytest.raises(ValueError, match="plane"):
+        ControllerServer(Setup(planes=(plane,)))

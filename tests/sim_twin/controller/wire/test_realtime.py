@@ -27,7 +27,7 @@ COLUMNS = {
     "tcp_speed_target": 80,
     "digital_inputs": 86,
     "motor_temperature_c": 87,
-    "controller_timer_s": 93,
+    "controller_timer_ms": 93,
     "robot_mode": 95,
     "joint_modes": 96,
     "safety_mode": 102,

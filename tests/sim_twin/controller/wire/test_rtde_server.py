@@ -97,10 +97,29 @@ def test_protocol_1_has_no_recipe_ids_and_125_hz(bench):
     assert bench.robot.written == [("input_int_register_0", 9)]
 
 
+@pytest.mark.parametrize("rate_hz", [200.0, 300.0, 400.0, 166.0, 1.0])
+def test_a_rate_that_does_not_divide_500_is_exact_on_average_and_every_package_at_a_slice(bench, rate_hz):
+    client = bench.rtde()
+    client.outputs("timestamp", rate_hz)
+    client.rtde("S")
+    sent_at = []
+    for step in range(1, 1001):
+        bench.robot.numbers["timestamp"] = float(step)
+        bench.wires.tick(step)
+        client.read()
+    client.silent(100)
+    while client.stock:
+        sent_at.append(struct.unpack(">d", client.take(12)[4:])[0])
+    assert len(sent_at) == 2 * rate_hz
+    late = np.array(sent_at) - np.arange(1, len(sent_at) + 1) * 500.0 / rate_hz
+    assert (late >= 0.0).all()
+    assert (late < 1.0).all()
+
+
 @pytest.mark.parametrize(
     ("rate_hz", "n"),
     [
-        *((500.0, 500), (499.0, 500), (250.0, 250), (125.0, 125), (10.0, 10), (1.0, 1), (2000.0, 500)),
+        *((500.0, 500), (499.0, 499), (250.0, 250), (125.0, 125), (10.0, 10), (1.0, 1), (2000.0, 500)),
         *((0.0, 500), (-1.0, 500), (NAN, 500), (float("inf"), 500), (1e-300, 0)),
     ],
 )
@@ -116,9 +135,12 @@ def test_each_client_has_its_own_pace(bench, rate_hz, n):
 def test_a_cb3_is_never_faster_than_125_hz(make_bench):
     bench = make_bench(ControllerVersion(major=3, minor=15, bugfix=8))
     client = bench.rtde()
+    slower = bench.rtde()
     client.outputs("timestamp", 500.0)
-    client.rtde("S")
+    slower.outputs("timestamp", 100.0)
+    assert client.rtde("S") == slower.rtde("S") == b"\x01"
     assert n_packages(bench, client, 500) == 125
+    assert n_packages(bench, slower, 0) == 100
 
 
 def test_an_unknown_output_is_not_found_and_leaves_no_recipe(bench):
