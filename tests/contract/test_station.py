@@ -302,7 +302,7 @@ def test_a_hostile_intent_is_refused_with_a_clear_verdict_and_moves_nothing(stan
 )
 def test_a_large_intent_is_shaped_and_never_latches(engaged, intent):
     station, _, _ = engaged
-    for _ in range(20):
+    for _ in range(8):
         before = station.step(Hold()).executed.target_m
         result = station.step(intent)
         assert result.verdicts == ()

@@ -21,7 +21,7 @@ MOST_WRONG = 0.1
 """What must be off may go unnoticed for long where no plan comes across it on; everything is mastered without it."""
 BUTTONS = ("orange_button", "green_button", "blue_button")
 LIDS = ("red_box", "square_box", "blue_box")
-PROTOCOL = {"epochs": EPOCHS, "evaluate_every": EPOCHS, "test_epochs": 10, "checkpoint_every": EPOCHS}
+PROTOCOL = {"epochs": EPOCHS, "evaluate_every": EPOCHS, "test_epochs": 6, "checkpoint_every": EPOCHS}
 
 
 def draw_rules(rng: np.random.Generator) -> list[dict]:

@@ -12,7 +12,7 @@ from sim_twin.paired.machine import Spare
 from tests.support.overbooked import OVERBOOKED_SHARE, Overbooked
 
 N_TRIES, LEAST_JUDGED = 3, 0.75
-ESSENTIAL = ("interfaces_frozen_1s", "servo_process_hung_and_jogged", "rtde_dropped", "cut_during_stop")
+ESSENTIAL = ("interfaces_frozen_1s", "servo_process_hung_and_jogged", "rtde_dropped")
 REASONS = {
     "link": "stale_state",
     "rtde": "stale_state",

@@ -78,6 +78,7 @@ def test_an_input_that_is_set_to_currents_sees_no_voltage_and_outputs_read_back_
     assert robot.panel.primary_state().masterboard.analog_outputs == pytest.approx((0.012, 5.0))
 
 
+@pytest.mark.slow
 def test_the_genuine_client_reads_how_far_the_arm_presses_a_button(tmp_path):
     pytest.importorskip("rtde_control", reason="the genuine client comes with `pip install autotelic[lab]`")
     scenario, cell = tmp_path / "small.yaml", tmp_path / "cell.yaml"

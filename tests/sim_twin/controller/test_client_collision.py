@@ -57,6 +57,7 @@ def test_an_arm_that_is_servoed_into_the_table_is_stopped_by_the_contact_force_a
         assert FORCE_LIMIT_N <= float(felt[1]) <= VIOLATION_N
 
 
+@pytest.mark.slow
 def test_a_safety_plane_stops_an_arm_that_the_client_drives_through_it():
     with make_station(own_address(), planes=((0.0, 0.0, 1.0, 0.1),)) as station:
         control, receive = station.control, station.receive
