@@ -57,6 +57,7 @@ def bench_servo(*, full: bool, seconds: float | None = None) -> BenchReport:
         blocks = Blocks(address=host, resolved=resolved)
         collect_rarely()  # as a servo process does
         seat = blocks.seat
+        _keep_off(process, seat.processors)
         try:
             noted: list[_Block] = []
             # A bar that draws itself does so in a thread of this process, in the midst of the ticks that are timed.
@@ -147,6 +148,12 @@ def _memory_rows(noted: list[_Block]) -> tuple[BenchResult, ...]:
             ),
         ]  # fmt: skip
     return tuple(rows)
+
+
+def _keep_off(process: ControllerProcess, processors: set[int]) -> None:
+    """Let the controller run anywhere but there: an arm's own is another machine, and takes no time from this one."""
+    for task in Path(f"/proc/{process.pid}/task").iterdir():
+        os.sched_setaffinity(int(task.name), os.sched_getaffinity(0) - processors)
 
 
 def _note(process: ControllerProcess, *, at_s: float, n_missed_before: float) -> _Block:

@@ -30,9 +30,8 @@ __all__ = ["PRIORITY", "ControllerServer", "Setup", "parse_version"]
 CONTROL_TICKS = 5
 """The faults' door is looked at this often: a look costs as much as a tenth of the physics."""
 PLAYED, MOST_MINOR = (3, 5), 99
-PRIORITY = 30
-"""What a process that runs nothing else may ask of the kernel: before all that is ordinary, and after the tick threads
-of clients on this machine, which a controller of its own would take no time from."""
+PRIORITY = 45
+"""What a process that runs nothing else may ask of the kernel: it stands for a box of its own, before its clients."""
 SWITCH_S = 0.0002
 """How long the compiler's thread may keep the interpreter from the loop."""
 
