@@ -14,7 +14,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from robot.chatter import chatter_to_stderr
+from robot.stdio import STDERR, redirected_stdout
 
 __all__ = ["BENCH_GROUP", "Bench", "BenchReport", "BenchResult", "bench", "bench_report"]
 
@@ -96,7 +96,7 @@ def _measure(point: EntryPoint, *, full: bool, run: Path | None, seconds: float 
     if seconds is not None and "seconds" not in known:
         raise typer.BadParameter(f"bench {point.name} has a length of its own", param_hint="--seconds")
     offered = {"run": run, "seconds": seconds}
-    with chatter_to_stderr():
+    with redirected_stdout(STDERR):
         return function(full=full, **{name: value for name, value in offered.items() if name in known})
 
 

@@ -5,12 +5,9 @@ on the MJCF that the twin is built from. A test holds all of them together to 1e
 before placo, and a test holds it to placo's answers.
 """
 
-import contextlib
 import math
 import os
-import sys
 import tempfile
-from collections.abc import Iterator
 from operator import le
 from pathlib import Path
 
@@ -22,6 +19,7 @@ from robot.description import tool_down, write_mjcf
 from robot.downward import DownwardArm
 from robot.errors import RobotError
 from robot.messages import Quat, Vec3, Vec6
+from robot.stdio import redirected_stdout
 
 __all__ = ["Kinematics", "ToolChain", "UnreachableError"]
 
@@ -198,19 +196,5 @@ def _load(arm: ArmConfig) -> placo.RobotWrapper:
     with tempfile.TemporaryDirectory(prefix="autotelic_") as folder:
         path = Path(folder) / "arm.xml"
         write_mjcf(arm, path)
-        with _silenced():
+        with open(os.devnull, "wb") as nowhere, redirected_stdout(nowhere.fileno()):  # placo prints from C++ on load
             return placo.RobotWrapper(str(path), placo.Flags.mjcf | placo.Flags.ignore_collisions)
-
-
-@contextlib.contextmanager
-def _silenced() -> Iterator[None]:
-    """Send the process's standard output nowhere: placo prints from C++ on load."""
-    sys.stdout.flush()
-    saved = os.dup(1)
-    try:
-        with open(os.devnull, "wb") as nowhere:
-            os.dup2(nowhere.fileno(), 1)
-        yield
-    finally:
-        os.dup2(saved, 1)
-        os.close(saved)

@@ -1,8 +1,7 @@
 """Real-time scheduling for the thread that must keep a tick of 2 ms, where the kernel grants it. Linux only.
 
-Without it a tick waits whenever others want the processor, for as long as the kernel shares it out: half a millisecond
-at a time and more. And a thread that is moved to another processor finds nothing there of what it worked with: its tick
-takes twice as long.
+Without it a tick waits whenever others want the CPU, for as long as the kernel shares it out. And a thread that is
+moved to another CPU finds nothing in its caches of what it worked with.
 """
 
 import gc
@@ -11,11 +10,11 @@ from contextlib import suppress
 from pathlib import Path
 from threading import get_native_id
 
-__all__ = ["Seat", "collect_rarely", "take_priority"]
+__all__ = ["CpuPin", "collect_rarely", "take_priority"]
 
 RARELY = 50_000
-"""Objects more than there were, before the collector looks for unreachable ones: some seconds of ticks. Ticks leave
-none, and each of its looks takes a tenth of one."""
+"""Objects more than there were, before the collector looks for unreachable ones: ticks leave none, and a look takes its
+time from one of them."""
 
 
 def take_priority(priority: int) -> str | None:
@@ -43,48 +42,43 @@ def take_priority(priority: int) -> str | None:
     return None
 
 
-class Seat:
-    """A processor for the thread that ticks: the last one, which the process's other threads then leave alone.
+class CpuPin:
+    """Pins the thread that ticks to the last CPU, and keeps the process's other threads off it.
 
-    Made, taken and left by that thread. Threads that it starts while it sits would have to share the seat, so that it
-    is left before clients are made.
+    Made and called by that thread. Threads that it starts while pinned would have to share its CPU, so that it is
+    unpinned before clients are made.
 
     Args:
-        priority: as `take_priority` takes it; 0 takes no seat either.
+        priority: as `take_priority` takes it; with 0, or where that is not granted, nothing is pinned either.
 
     Attributes:
         why_not: Why the priority was not granted; None where it was, or none was asked for.
+        cpus: The CPU; nothing where there is none.
     """
 
     def __init__(self, priority: int) -> None:
         self.why_not = take_priority(priority)
         self._everywhere = os.sched_getaffinity(0)
-        self._seat = {max(self._everywhere)} if priority and self.why_not is None else set[int]()
+        self.cpus = {max(self._everywhere)} if priority and self.why_not is None else set[int]()
 
-    @property
-    def processors(self) -> set[int]:
-        """The seat; nothing where there is none."""
-        return set(self._seat)
-
-    def take(self) -> None:
-        """Stay on the seat from now on, and send the other threads of this process elsewhere."""
-        if not self._seat:
+    def pin(self) -> None:
+        """Stay on the CPU from now on, and send the other threads of this process elsewhere."""
+        if not self.cpus:
             return
-        own = get_native_id()
         for entry in Path("/proc/self/task").iterdir():
             with suppress(OSError):  # a thread that has just ended
-                os.sched_setaffinity(int(entry.name), self._everywhere - self._seat)
-        os.sched_setaffinity(own, self._seat)
+                os.sched_setaffinity(int(entry.name), self._everywhere - self.cpus)
+        os.sched_setaffinity(get_native_id(), self.cpus)
 
-    def leave(self) -> None:
+    def unpin(self) -> None:
         """Run wherever there is room, as threads do that are started from now on."""
-        if self._seat:
+        if self.cpus:
             os.sched_setaffinity(0, self._everywhere)
 
-    def give_up(self) -> None:
-        """Leave the seat and the priority."""
-        if self._seat:
-            self.leave()
+    def release(self) -> None:
+        """Unpin, and give the priority up."""
+        if self.cpus:
+            self.unpin()
             os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
 
 

@@ -22,11 +22,10 @@ import msgspec
 
 from config.arm import ArmConfig
 from config.resolved import Resolved
-from robot.chatter import divert_chatter
 from robot.errors import RobotError, SafetyError, WireError
 from robot.hal.protocols import Linked, Plant
 from robot.messages import ArmState, GripCommand, Verdict
-from robot.realtime import Seat, collect_rarely
+from robot.realtime import CpuPin, collect_rarely
 from robot.rigs import build_plant
 from robot.safety import Reason
 from robot.servo_messages import (
@@ -47,6 +46,7 @@ from robot.servo_messages import (
     StrideRequest,
     unpack_intent,
 )
+from robot.stdio import STDERR, STDOUT
 from robot.tick_loop import TickLoop
 
 __all__ = ["ServoServer", "serve"]
@@ -80,13 +80,13 @@ def serve(connection: Connection, resolved_json: bytes, pulse: MutableSequence[i
     SIGTERM stops the arm and ends it too. It does not return: ruckig's binding would tell of some thirty leaks at the
     interpreter's end, over what a person is to read.
     """
-    divert_chatter()  # ur_rtde tells of reconnections, placo of the model that it loads
+    os.dup2(STDERR, STDOUT)  # ur_rtde tells of reconnections, placo of the model that it loads
     os.setpgrp()
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(EXIT_TERMINATED))
     resolved = msgspec.json.decode(resolved_json, type=Resolved)
-    seat = Seat(resolved.rig.realtime_priority)
-    if seat.why_not is not None:
-        print(f"servo process: {seat.why_not}", file=sys.stderr, flush=True)  # noqa: T201 - for a person
+    pin = CpuPin(resolved.rig.realtime_priority)
+    if pin.why_not is not None:
+        print(f"servo process: {pin.why_not}", file=sys.stderr, flush=True)  # noqa: T201 - for a person
     plant = build_plant(rig=resolved.rig, arm=resolved.arm, scenario=resolved.scenario, cell=resolved.cell)
     server: ServoServer
 
@@ -116,7 +116,7 @@ def serve(connection: Connection, resolved_json: bytes, pulse: MutableSequence[i
         arm=resolved.arm,
         pulse=pulse,
         die=die,
-        seat=seat,
+        pin=pin,
     )
     collect_rarely()
     code = 0
@@ -146,7 +146,7 @@ class ServoServer:
         arm: the arm's file.
         pulse: shared memory of one number: ticks so far while it ticks, otherwise 0.
         die: ends the process on the spot.
-        seat: where this thread ticks.
+        pin: keeps this thread on a CPU of its own while it is in command.
     """
 
     def __init__(
@@ -158,9 +158,9 @@ class ServoServer:
         arm: ArmConfig,
         pulse: MutableSequence[int],
         die: Callable[[], object],
-        seat: Seat,
+        pin: CpuPin,
     ) -> None:
-        self._seat = seat
+        self._cpu = pin
         self._connection, self._plant, self._loop, self._tool = connection, plant, loop, arm.tool
         self._intent_max_age_ns = round(arm.motion.intent_max_age_s * 1e9)
         self._begin_ticks = round(BEGIN_S * plant.arm.spec.rate_hz)
@@ -253,11 +253,11 @@ class ServoServer:
     def _obey(self, request: Request) -> Reply:
         match request:
             case Connect():
-                self._seat.leave()
+                self._cpu.unpin()
                 self._loop.connect()
                 return Connected(identity=self._plant.identity)
             case Engage():
-                self._seat.leave()
+                self._cpu.unpin()
                 self._loop.engage()
             case Seed():
                 return Seeded(state=self._seed())
@@ -280,7 +280,7 @@ class ServoServer:
             opening_m=opening_m, force_n=self._tool.grip_force_n, speed_m_s=self._tool.speed_m_s[0]
         )
         self._rest()
-        self._seat.take()
+        self._cpu.pin()
         self._is_in_command = True
         return state
 

@@ -56,8 +56,8 @@ def bench_servo(*, full: bool, seconds: float | None = None) -> BenchReport:
     with ControllerProcess(Setup(host=host)) as process:
         blocks = Blocks(address=host, resolved=resolved)
         collect_rarely()  # as a servo process does
-        seat = blocks.seat
-        _keep_off(process, seat.processors)
+        cpu = blocks.cpu
+        _keep_off(process, cpu.cpus)
         try:
             noted: list[_Block] = []
             # A bar that draws itself does so in a thread of this process, in the midst of the ticks that are timed.
@@ -68,13 +68,13 @@ def bench_servo(*, full: bool, seconds: float | None = None) -> BenchReport:
                 blocks.run_ours(ours_s)
                 noted.append(_note(process, at_s=perf_counter() - begin, n_missed_before=before["n_missed"]))
         finally:
-            seat.give_up()
+            cpu.release()
             gc.unfreeze()
             gc.set_threshold(*thresholds)
             blocks.close()
     priority = BenchResult(
-        name="realtime_priority", value=0.0 if seat.why_not else resolved.rig.realtime_priority, unit="1",
-        details={"not granted": seat.why_not} if seat.why_not else msgspec.UNSET,
+        name="realtime_priority", value=0.0 if cpu.why_not else resolved.rig.realtime_priority, unit="1",
+        details={"not granted": cpu.why_not} if cpu.why_not else msgspec.UNSET,
     )  # fmt: skip
     results = (*_period_rows(blocks), priority, *_controller_rows(noted, ours_s=ours_s), *_memory_rows(noted))
     return bench_report("servo", results, seconds=perf_counter() - begin)
@@ -150,10 +150,10 @@ def _memory_rows(noted: list[_Block]) -> tuple[BenchResult, ...]:
     return tuple(rows)
 
 
-def _keep_off(process: ControllerProcess, processors: set[int]) -> None:
+def _keep_off(process: ControllerProcess, cpus: set[int]) -> None:
     """Let the controller run anywhere but there: an arm's own is another machine, and takes no time from this one."""
     for task in Path(f"/proc/{process.pid}/task").iterdir():
-        os.sched_setaffinity(int(task.name), os.sched_getaffinity(0) - processors)
+        os.sched_setaffinity(int(task.name), os.sched_getaffinity(0) - cpus)
 
 
 def _note(process: ControllerProcess, *, at_s: float, n_missed_before: float) -> _Block:

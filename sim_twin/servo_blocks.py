@@ -13,7 +13,7 @@ from robot.errors import RobotError
 from robot.hal.protocols import Clock
 from robot.hal.rtde import RtdeArm
 from robot.messages import GripCommand, Heading
-from robot.realtime import Seat
+from robot.realtime import CpuPin
 from robot.tick_loop import TickLoop
 from sim_twin.tally import Tally
 
@@ -90,7 +90,7 @@ class Blocks:
         bare_call: What the client's servoJ took there.
         n_stops: Blocks of ours that ended before their time, by a refusal of the gate or a loss of the arm.
         servo_s: How long our loop was in command.
-        seat: Where this thread ticks, with either client.
+        cpu: Where this thread ticks, with either client.
     """
 
     def __init__(self, *, address: str, resolved: Resolved) -> None:
@@ -108,18 +108,18 @@ class Blocks:
         self.n_stops, self.servo_s = 0, 0.0
         self._address, self._resolved = address, resolved
         self._servo, self._tool = resolved.arm.servo, resolved.arm.tool
-        self.seat = Seat(resolved.rig.realtime_priority)
+        self.cpu = CpuPin(resolved.rig.realtime_priority)
         self._call_s = 0.0
         self._begin_anew()
 
     def run_bare(self, duration_s: float) -> None:
         """Swing the base with the client's calls alone; a receive interface is open as it is in our blocks."""
-        self.seat.leave()
+        self.cpu.unpin()
         self._arm.connect()
         control = _control_of(self._arm.address)
         q, servo, calls = list(self._arm.read().q_rad), self._servo, Tally()
         middle_rad = q[0]
-        self.seat.take()
+        self.cpu.pin()
         begun_s = woke_s = perf_counter()
         while woke_s - begun_s < duration_s:
             start = control.initPeriod()
@@ -139,12 +139,12 @@ class Blocks:
 
     def run_ours(self, duration_s: float) -> None:
         """Lead the tool round a circle through motion, cell, gate and backend, as a servo process does."""
-        self.seat.leave()
+        self.cpu.unpin()
         try:
             self._loop.connect()
             self._loop.begin_epoch(0)
             self._loop.engage()
-            self.seat.take()
+            self.cpu.pin()
             is_whole = self._go_round(duration_s)
         except RobotError:
             is_whole = False

@@ -59,6 +59,8 @@ class Watchdogs:
         """
         for watched in self._watched.values():
             watched.n_waited += 1
+        if not any(watched.is_starved for watched in self._watched.values()):
+            return None
         for action in _STRICTEST_FIRST:
             due = {name: w for name, w in self._watched.items() if w.action is action and w.is_starved}
             if due:

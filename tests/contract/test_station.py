@@ -300,8 +300,8 @@ def test_a_hostile_intent_is_refused_with_a_clear_verdict_and_moves_nothing(stan
         JointTarget(q_rad=(6.0, 6.0, -6.0, 6.0, -6.0, 6.0)),
     ],
 )
-def test_a_large_intent_is_shaped_and_never_latches(engaged, intent):
-    station, _, _ = engaged
+def test_a_large_intent_is_shaped_and_never_latches(standing, intent):
+    station, _, _ = standing
     for _ in range(8):
         before = station.step(Hold()).executed.target_m
         result = station.step(intent)

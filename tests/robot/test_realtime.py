@@ -1,4 +1,4 @@
-"""The tick thread's seat, in a process of its own: who runs where, and that nothing of it stays behind."""
+"""The tick thread pinned to a CPU, in a process of its own: who runs where, and that nothing of it stays behind."""
 
 import subprocess
 import sys
@@ -6,35 +6,35 @@ from pathlib import Path
 
 import pytest
 
-SEATED = """
+PINNED = """
 import os, threading
-from robot.realtime import Seat
+from robot.realtime import CpuPin
 from threading import get_native_id
 before = os.sched_getaffinity(0)
-seat = Seat({priority})
-print(seat.why_not)
+pin = CpuPin({priority})
+print(pin.why_not)
 def threads():
     return {{int(t): os.sched_getaffinity(int(t)) for t in os.listdir("/proc/self/task")}}
 other = threading.Event()
 thread = threading.Thread(target=other.wait)
 thread.start()
-seat.take()
+pin.pin()
 found = threads()
-is_seated = found.pop(get_native_id()) == seat.processors
-print(len(seat.processors), is_seated, all(not places & seat.processors for places in found.values()), len(found) > 0)
-seat.leave()
+is_pinned = found.pop(get_native_id()) == pin.cpus
+print(len(pin.cpus), is_pinned, all(not places & pin.cpus for places in found.values()), len(found) > 0)
+pin.unpin()
 late = threading.Thread(target=other.wait)
 late.start()
 print(threads()[late.native_id] == before, os.sched_getscheduler(0) == os.SCHED_FIFO)
-seat.give_up()
+pin.release()
 print(os.sched_getaffinity(0) == before, os.sched_getscheduler(0) == os.SCHED_OTHER)
 other.set()
 """
 
 
-def seated(priority, *, limit=""):
+def pinned(priority, *, limit=""):
     done = subprocess.run(
-        [sys.executable, "-c", limit + SEATED.format(priority=priority)],
+        [sys.executable, "-c", limit + PINNED.format(priority=priority)],
         cwd=Path(__file__).parents[2], capture_output=True, text=True, check=False,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
@@ -42,10 +42,10 @@ def seated(priority, *, limit=""):
 
 
 def test_the_tick_thread_has_a_processor_to_itself_until_it_leaves():
-    why_not, seat, late, after = seated(5)
+    why_not, cpu, late, after = pinned(5)
     if why_not != "None":
         pytest.skip(f"no real-time priority here: {why_not}")
-    assert seat == "1 True True True"
+    assert cpu == "1 True True True"
     assert late == "True True"
     assert after == "True True"
 
@@ -63,7 +63,7 @@ def test_the_tick_thread_has_a_processor_to_itself_until_it_leaves():
     ],
 )
 def test_without_it_everything_runs_where_it_did_and_why_is_said(priority, limit, said):
-    why_not, seat, _, after = seated(priority, limit=limit)
+    why_not, cpu, _, after = pinned(priority, limit=limit)
     assert said in why_not
-    assert seat == "0 False True True"
+    assert cpu == "0 False True True"
     assert after == "True True"

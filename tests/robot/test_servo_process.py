@@ -9,7 +9,7 @@ import pytest
 from robot.errors import ArmRefusedError, StaleStateError, WireError
 from robot.hal.fake import FakePlant
 from robot.messages import ArmMode, GripCommand, Heading
-from robot.realtime import Seat
+from robot.realtime import CpuPin
 from robot.servo_client import ServoClient
 from robot.servo_messages import (
     Close,
@@ -56,7 +56,7 @@ class Served:
             arm=rig.arm,
             pulse=self.pulse,
             die=self.die,
-            seat=Seat(0),
+            pin=CpuPin(0),
         )
         self.thread = Thread(target=self.run)
         self.thread.start()

@@ -7,7 +7,7 @@ import msgspec
 from config.resolved import Resolved
 from robot.hal.protocols import Plant
 from robot.messages import ArmState, GripCommand, Intent
-from robot.realtime import Seat
+from robot.realtime import CpuPin
 from robot.servo_messages import (
     BeginEpoch,
     Connect,
@@ -48,7 +48,7 @@ class HandServed:
         )  # fmt: skip
         self.server = ServoServer(
             connection=theirs, plant=plant, loop=self.loop, arm=resolved.arm, pulse=[0], die=lambda: None,
-            seat=Seat(0),
+            pin=CpuPin(0),
         )  # fmt: skip
         self._ask(Connect())
         self._ask(Engage())

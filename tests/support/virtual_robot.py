@@ -5,7 +5,7 @@ import numpy as np
 from sim_twin.controller.robot import VirtualRobot, make_world
 from sim_twin.controller.states import RuntimeState
 
-__all__ = ["FOREVER", "RegisterClient", "ended", "lines", "make_robot", "run", "started", "state_of"]
+__all__ = ["FOREVER", "RegisterClient", "ended", "lines", "make_robot", "run", "started", "state_of", "swept_rad"]
 
 READY, DONE, FREE = 1, 2, 0
 FOREVER = "def waits():\n  while True:\n    sync()\n  end\nend\n"
@@ -93,3 +93,13 @@ class RegisterClient:
 
     def joints(self):
         return np.array(self.trace)
+
+
+def swept_rad(robot, n):
+    """Step and return the greatest way of any joint from where it is, at any time."""
+    q = robot.machine.world.data.qpos
+    start, furthest = q[:6].copy(), 0.0
+    for _ in range(n):
+        robot.step()
+        furthest = max(furthest, float(np.abs(q[:6] - start).max()))
+    return furthest

@@ -1,6 +1,5 @@
 """What no stop lets through, on an arm: secondary programs, laws that comply, whatever moves when a stop comes."""
 
-import numpy as np
 import pytest
 
 from sim_twin.controller.builtins import program_builtins
@@ -9,20 +8,10 @@ from sim_twin.controller.motion import ForceTask
 from sim_twin.controller.script.builtins import Sockets
 from sim_twin.controller.states import Event, RuntimeState
 from sim_twin.controller.wire import ControllerVersion
-from tests.support.virtual_robot import lines, make_robot, run, state_of
+from tests.support.virtual_robot import lines, make_robot, run, state_of, swept_rad
 
 NEWEST = ControllerVersion(minor=26)
 FORCE = "force_mode(p[0,0,0,0,0,0], [1,1,1,0,0,0], [20,0,20,0,0,0], 2, [0.1,0.1,0.1,0.3,0.3,0.3])"
-
-
-def moved_rad(robot, n):
-    """Step and return how far the joint that went furthest got, at any time."""
-    q = robot.machine.world.data.qpos
-    start, furthest = q[:6].copy(), 0.0
-    for _ in range(n):
-        robot.step()
-        furthest = max(furthest, float(np.abs(q[:6] - start).max()))
-    return furthest
 
 
 @pytest.mark.parametrize("stop", [None, Event.PROTECTIVE_STOP, Event.SAFEGUARD_OPENED])
@@ -48,8 +37,8 @@ def test_a_secondary_program_cannot_move_the_arm(call, stop):
     run(robot, 50)
     for _ in range(20):
         robot.submit_script(f"sec side():\n def f():\n  stopj(a=2)\n end\n {call}\n set_digital_out(1, True)\nend\n")
-        assert moved_rad(robot, 2) < 1e-4
-    assert moved_rad(robot, 50) < 1e-4
+        assert swept_rad(robot, 2) < 1e-4
+    assert swept_rad(robot, 50) < 1e-4
     core = robot.machine.drive.core
     assert (core.force_task, core.is_free, core.tail) == (None, False, None)
     assert robot.machine.io.digital_out == 0
@@ -85,7 +74,7 @@ def test_nothing_complies_where_no_program_may_move(law):
     else:
         core.freedrive()
         robot.machine.world.data.qfrc_applied[0] = 8.0
-    assert moved_rad(robot, 200) < 2e-3
+    assert swept_rad(robot, 200) < 2e-3
     assert (core.force_task, core.is_free) == (None, False)
 
 
@@ -101,10 +90,10 @@ def test_after_a_safeguard_and_another_stop_only_a_person_goes_on():
         run(robot, n)
     assert robot.programs.handle(Event.UNLOCK_PROTECTIVE_STOP).refusal is None
     robot.programs.handle(Event.SAFEGUARD_CLOSED)
-    assert moved_rad(robot, 200) < 1e-3
+    assert swept_rad(robot, 200) < 1e-3
     assert state_of(robot) is RuntimeState.PAUSED
     robot.panel.play()
-    assert moved_rad(robot, 200) > 0.03
+    assert swept_rad(robot, 200) > 0.03
 
 
 def test_a_safeguard_while_nothing_runs_holds_no_later_program_up():
@@ -114,7 +103,7 @@ def test_a_safeguard_while_nothing_runs_holds_no_later_program_up():
         run(robot, 200)
     assert robot.outputs["speed_scaling"]() == 1.0
     robot.submit_script(MOVES.format(way=0.2, v=1.0))
-    assert moved_rad(robot, 400) > 0.19
+    assert swept_rad(robot, 400) > 0.19
     assert state_of(robot) is RuntimeState.STOPPED
 
 
@@ -127,6 +116,6 @@ def test_a_program_begins_unpaused_whatever_held_the_one_before():
     robot.panel.stop()
     run(robot, 50)
     robot.programs.handle(Event.SAFEGUARD_CLOSED)
-    assert moved_rad(robot, 100) < 1e-3, "what was stopped stays stopped"
+    assert swept_rad(robot, 100) < 1e-3, "what was stopped stays stopped"
     robot.submit_script(MOVES.format(way=0.2, v=1.0))
-    assert moved_rad(robot, 400) > 0.19
+    assert swept_rad(robot, 400) > 0.19

@@ -5,7 +5,7 @@ import pytest
 
 from sim_twin.controller.states import Event, PowerTimes, RobotMode, RuntimeState, SafetyMode
 from sim_twin.controller.wire import ControllerVersion
-from tests.support.virtual_robot import run, started, state_of
+from tests.support.virtual_robot import run, started, state_of, swept_rad
 
 NEWEST = ControllerVersion(minor=26)
 PAUSED, STOPPED, PLAYING = RuntimeState.PAUSED, RuntimeState.STOPPED, RuntimeState.PLAYING
@@ -63,16 +63,6 @@ def moving(motion, n=90):
     run(robot, n)
     assert float(np.abs(data.qvel[:6]).max()) > 0.03, "it was not moving"
     return robot
-
-
-def swept_rad(robot, n):
-    """Step and return the greatest way of any joint from where it is, at any time."""
-    q = robot.machine.world.data.qpos
-    start, furthest = q[:6].copy(), 0.0
-    for _ in range(n):
-        robot.step()
-        furthest = max(furthest, float(np.abs(q[:6] - start).max()))
-    return furthest
 
 
 @pytest.mark.parametrize(

@@ -6,9 +6,9 @@ from pathlib import Path
 
 SCRIPT = """
 import os, subprocess, sys
-from robot.chatter import chatter_to_stderr
+from robot.stdio import STDERR, redirected_stdout
 print("before")
-with chatter_to_stderr():
+with redirected_stdout(STDERR):
     os.write(1, b"from C\\n")
     print("from Python")
     subprocess.run([sys.executable, "-c", "print('from a child')"], check=True)
