@@ -24,8 +24,10 @@ check: setup
 	$(BIN)/pyright
 	$(BIN)/lint-imports
 
+# What keeps to a wall's clock runs alone; the rest shares the processors.
 test: check
-	$(BIN)/pytest
+	$(BIN)/pytest -m "not slow and not realtime" --numprocesses auto --dist loadfile
+	$(BIN)/pytest -m "not slow and realtime"
 
 test-slow: setup
 	$(BIN)/pytest -m slow

@@ -1,4 +1,10 @@
-"""The programs: one that moves the arm, secondary ones beside it, and those on the shelf. Stepped once a slice."""
+"""The programs: one that moves the arm, secondary ones beside it, and those on the shelf. Stepped once a slice.
+
+A secondary program ends in its slice, or fails there, and has the slice to itself: each may spend a whole budget, and a
+flood of them must not hold the controller's loop.
+"""
+
+from collections import deque
 
 from sim_twin.controller.compiling import Compiled, Compiler, Mistake, Start
 from sim_twin.controller.machine import Machine
@@ -10,6 +16,8 @@ __all__ = ["UNNAMED", "Programs"]
 UNNAMED = "unnamed"
 SECONDARY = "SECONDARY_PROGRAM_EXCEPTION_XXX"
 """What a robot puts before the reason for which a secondary program failed."""
+N_SECONDARY = 1000
+"""Secondary programs that wait; one more is turned away, or a flood would fill the memory."""
 
 
 class Programs:
@@ -34,7 +42,7 @@ class Programs:
         self.loaded: str | None = None
         self.last_text = ""
         self._next: tuple[Compiled, Start] | None = None
-        self._secondary: list[Compiled] = []
+        self._secondary = deque[Compiled]()
         self._n_stops = 0
 
     @property
@@ -84,8 +92,8 @@ class Programs:
             status = self.main.interpreter.step()
             if status is not Status.RUNNING:
                 self._finish(self.main)
-        if self._secondary:
-            self._secondary = [p for p in self._secondary if self._step_beside(p)]
+        if self._secondary and not self._step_beside(self._secondary[0]):
+            self._secondary.popleft()
         while machine.posted:
             self.handle(machine.posted.popleft())
 
@@ -96,7 +104,8 @@ class Programs:
         for program in (self.main, waiting, *self._secondary):
             if program is not None:
                 program.close()
-        self.main, self._next, self._secondary = None, None, []
+        self.main, self._next = None, None
+        self._secondary.clear()
 
     def _take(self, done: Compiled | Mistake, start: Start) -> None:
         if isinstance(done, Mistake):
@@ -109,6 +118,8 @@ class Programs:
                 as_reported=done.as_reported,
             )
             start.has_begun = False
+        elif done.is_secondary and len(self._secondary) >= N_SECONDARY:
+            self._turn_down(done, start, f"{N_SECONDARY} secondary programs wait for their slice")
         elif done.is_secondary:
             self._secondary.append(done)
             start.has_begun = True

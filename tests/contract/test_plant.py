@@ -18,6 +18,8 @@ from robot.servo import lag_s
 from tests.contract.fits import PLANTS
 from tests.support.contract_rigs import WORLDS
 
+pytestmark = pytest.mark.realtime
+
 LIDS = 0b111000
 RATES_RAD_S = np.array([0.3, 0.1, 0.0, 0.0, 0.0, -0.2])
 

@@ -21,6 +21,8 @@ from robot.messages import (
 from robot.safety import TooManyLatchesError
 from sim_twin.operator import SimulatedOperator
 
+pytestmark = pytest.mark.realtime
+
 
 @pytest.fixture
 def disarmed(world):

@@ -16,6 +16,8 @@ from learning.run_folder import RunFolder
 from robot.bus import RESET, ResetRequest, open_session, topic
 from tests.support.small_lab import SERIAL, autotelic, children_of, controller_of, make_lab, start
 
+pytestmark = pytest.mark.realtime
+
 HOST = "127.0.0.61"
 ENDLESS = """\
 name: endless

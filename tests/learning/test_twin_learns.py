@@ -50,7 +50,8 @@ def draw_scenario(folder: Path, rng: np.random.Generator) -> Path:
     return path
 
 
-@pytest.mark.parametrize("seed", [31, *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(32, 38))])
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(31, 38))
 def test_rules_and_an_order_of_distances_drawn_at_random_are_learnt(tmp_path, seed):
     scenario = draw_scenario(tmp_path, np.random.default_rng(seed))
     assert load_scenario(scenario).distances != load_scenario("paper").distances

@@ -16,6 +16,8 @@ from robot.messages import ArmCommand, GripCommand
 from robot.tick_loop import TickLoop
 from tests.support.small_lab import SERIAL, autotelic, controller_of, make_lab, start
 
+pytestmark = pytest.mark.realtime
+
 HOST = "127.0.0.62"
 CELL = """\
 name: odd

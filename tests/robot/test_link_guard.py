@@ -11,6 +11,8 @@ from robot.hal import link_guard
 from robot.hal.link_guard import LinkGuard
 from robot.hal.link_watch import LinkWatch
 
+pytestmark = pytest.mark.realtime
+
 HOST = "127.0.0.37"
 SOON_S = 5.0
 

@@ -8,6 +8,8 @@ import pytest
 
 from robot.hal.link_watch import LinkWatch
 
+pytestmark = pytest.mark.realtime
+
 HOST = "127.0.0.36"
 
 

@@ -14,6 +14,8 @@ from sim_twin.controller.wire.gripper_port import GripperMeasurement, GripperReq
 from sim_twin.controller.wire.peer import Budget
 from sim_twin.controller.wire.reactor import Reactor
 
+pytestmark = pytest.mark.realtime
+
 TOOL = load_arm("ur5e").tool
 HOST = "127.0.4.3"
 

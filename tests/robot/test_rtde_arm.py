@@ -14,6 +14,8 @@ from sim_twin.controller.process import ControllerProcess
 from sim_twin.controller.server import Setup
 from tests.support.loopback import own_address
 
+pytestmark = pytest.mark.realtime
+
 pytest.importorskip("rtde_control", reason="the genuine client comes with `pip install autotelic[lab]`")
 
 CONFIG = load_arm("ur5e")

@@ -8,6 +8,8 @@ from robot.errors import RobotConfigError
 from robot.messages import PlantKind
 from robot.rigs import build_plant
 
+pytestmark = pytest.mark.realtime
+
 
 @pytest.fixture(scope="module")
 def resolved():

@@ -10,6 +10,8 @@ from robot.errors import WireError
 from robot.hal.rtde_probe import RTDE_PORT, probe_rtde
 from tests.support.loopback import own_address
 
+pytestmark = pytest.mark.realtime
+
 SHORT_S = 0.2
 
 

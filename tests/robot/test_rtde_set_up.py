@@ -10,6 +10,8 @@ from robot.errors import ArmRefusedError
 from robot.hal.rtde_set_up import prove_watchdog, set_tool
 from tests.support.loopback import own_address
 
+pytestmark = pytest.mark.realtime
+
 pytest.importorskip("rtde_control", reason="the genuine client comes with `pip install autotelic[lab]`")
 
 

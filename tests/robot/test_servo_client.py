@@ -16,6 +16,8 @@ from robot.servo_client import ServoClient
 from robot.servo_process import EXIT_TERMINATED
 from tests.support.stations import fake_rig
 
+pytestmark = pytest.mark.realtime
+
 OPEN = GripCommand(opening_m=0.085, force_n=20.0, speed_m_s=0.15)
 N_TICKS = 5
 

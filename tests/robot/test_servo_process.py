@@ -30,6 +30,8 @@ from robot.servo_process import ServoServer
 from robot.tick_loop import TickLoop
 from tests.support.stations import fake_rig
 
+pytestmark = pytest.mark.realtime
+
 WAIT_S = 10.0
 
 

@@ -10,6 +10,8 @@ import pytest
 
 from robot.servo_watch import LOOK_S, Patience, ServoWatch
 
+pytestmark = pytest.mark.realtime
+
 ENDS_S = 10.0
 
 

@@ -26,6 +26,8 @@ from sim_twin.controller.wire.primary_state import (
 from sim_twin.controller.wire.version import ControllerVersion
 from tests.support.loopback import own_address
 
+pytestmark = pytest.mark.realtime
+
 ARM = load_arm("ur5e")
 Q = (0.3, -1.4, 1.7, -1.9, -1.5, 0.4)
 VERSION = ControllerVersion(major=5, minor=11, bugfix=6, build=0)

@@ -8,6 +8,8 @@ import pytest
 from sim_twin.servo_bench import bench_servo
 from sim_twin.tally import Tally
 
+pytestmark = pytest.mark.realtime
+
 AGREED = (
     "period_p50_ms", "period_p99_ms", "bare_period_p99_ms", "own_work_p99_us", "controller_tick_p99_ms",
     "late_tick_share",

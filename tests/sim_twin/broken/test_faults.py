@@ -11,6 +11,8 @@ from sim_twin.broken import TRIALS, Course, CutShortError, DisturbedError
 from sim_twin.paired.machine import Spare
 from tests.support.overbooked import OVERBOOKED_SHARE, Overbooked
 
+pytestmark = pytest.mark.realtime
+
 N_TRIES, LEAST_JUDGED = 3, 0.75
 ESSENTIAL = ("interfaces_frozen_1s", "servo_process_hung_and_jogged", "rtde_dropped")
 REASONS = {

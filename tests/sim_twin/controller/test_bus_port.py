@@ -13,6 +13,8 @@ from sim_twin.controller.bus_port import PATIENCE_SLICES, BusPort
 from sim_twin.controller.states import Event, RuntimeState
 from tests.support.virtual_robot import make_robot, run
 
+pytestmark = pytest.mark.realtime
+
 MOVES = "def f():\n q = get_actual_joint_positions()\n q[0] = q[0] + 0.2\n movej(q, a=8, v=2)\nend\n"
 FOREVER = "def waits():\n  while True:\n    sync()\n  end\nend\n"
 SLICES_AT_MOST = 1500

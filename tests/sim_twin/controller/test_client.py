@@ -10,6 +10,8 @@ from sim_twin.controller.server import Setup
 from tests.support.genuine_client import HOME, make_station, until
 from tests.support.loopback import own_address
 
+pytestmark = pytest.mark.realtime
+
 pytest.importorskip("rtde_control", reason="the genuine client comes with `pip install autotelic[lab]`")
 
 HOST = own_address()

@@ -8,6 +8,8 @@ import pytest
 from tests.support.genuine_client import make_station, moved, until
 from tests.support.loopback import own_address
 
+pytestmark = pytest.mark.realtime
+
 pytest.importorskip("rtde_control", reason="the genuine client comes with `pip install autotelic[lab]`")
 
 OVER_M, DOWN_M, SPEED_M_S, TICK_S = 0.03, 0.07, 0.06, 0.002

@@ -8,6 +8,8 @@ import pytest
 from tests.support.genuine_client import HOME, make_station, moved, until
 from tests.support.loopback import own_address
 
+pytestmark = pytest.mark.realtime
+
 pytest.importorskip("rtde_control", reason="the genuine client comes with `pip install autotelic[lab]`")
 
 TOLERANCE = 0.005

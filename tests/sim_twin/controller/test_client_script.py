@@ -13,6 +13,8 @@ from sim_twin.controller.server import Setup
 from tests.support.loopback import own_address
 from tests.support.virtual_robot import RegisterClient, make_robot
 
+pytestmark = pytest.mark.realtime
+
 pytest.importorskip("rtde_control", reason="the genuine client comes with `pip install autotelic[lab]`")
 
 HOME = np.array([2.8186, -1.7634, 2.014, -1.8213, -1.5708, -1.8938])

@@ -16,6 +16,8 @@ from sim_twin.controller.process import ControllerProcess, ControllerProcessErro
 from sim_twin.controller.server import Setup
 from sim_twin.controller.wire.wires import DASHBOARD
 
+pytestmark = pytest.mark.realtime
+
 HOST = "127.0.0.9"
 RUN = [sys.executable, "-c", "from sim_twin.controller.cli import app; app()"]
 

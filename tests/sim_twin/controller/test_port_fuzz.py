@@ -12,6 +12,8 @@ from robot.servo import lag_s
 from tests.support.genuine_client import HOME, make_station
 from tests.support.port_fuzz import PORTS, FuzzBeside
 
+pytestmark = pytest.mark.realtime
+
 HOST = "127.0.0.34"
 PERIOD_S, SWING_RAD = 0.004, 0.02
 GROWTH_MB = 40.0

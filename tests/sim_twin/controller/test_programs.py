@@ -6,10 +6,12 @@ from threading import Event as Gate
 import pytest
 
 from sim_twin.controller.compiling import InlineCompiler, ThreadCompiler
+from sim_twin.controller.program import N_SECONDARY
 from sim_twin.controller.states import Event, RuntimeState, SafetyMode
 from sim_twin.controller.wire import Outcome
 from tests.support.virtual_robot import FOREVER, ended, lines, make_robot, run, started, state_of
 
+SEC = "sec side():\n set_digital_out(3, True)\nend\n"
 STOPPED, PLAYING, PAUSED = RuntimeState.STOPPED, RuntimeState.PLAYING, RuntimeState.PAUSED
 
 
@@ -32,6 +34,29 @@ def test_a_def_replaces_and_a_sec_runs_beside():
     run(robot, 10)
     assert robot.programs.main.name == "other"
     assert state_of(robot) is PLAYING
+
+
+def test_secs_take_a_slice_each_in_their_order_whatever_they_spend():
+    robot = started(FOREVER)
+    before = robot.machine.world.digital_out
+    for k in range(3):
+        robot.submit_script(f"sec side():\n set_digital_out({k}, True)\n while True:\n  a = 1\n end\nend\n")
+    seen = []
+    for _ in range(4):
+        run(robot, 1)
+        seen.append(robot.machine.world.digital_out)
+    assert before == 0
+    assert seen == [0b1, 0b11, 0b111, 0b111]
+    assert len([line for line in lines(robot) if "infinite loop" in line]) == 3
+    assert state_of(robot) is PLAYING
+
+
+def test_more_secs_than_may_wait_are_turned_away_and_say_so():
+    robot = started(FOREVER)
+    starts = [robot.programs.submit(SEC) for _ in range(N_SECONDARY + 1)]
+    run(robot, 1)
+    assert [start.has_begun for start in starts] == [True] * N_SECONDARY + [False]
+    assert any("secondary programs wait" in line for line in lines(robot))
 
 
 def test_a_speed_ends_with_its_program():

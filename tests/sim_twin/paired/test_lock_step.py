@@ -12,6 +12,8 @@ from sim_twin.paired import Kind, Track, compare, drive_errand
 from sim_twin.plant import TwinPlant
 from tests.support.hand_served import HandServed
 
+pytestmark = pytest.mark.realtime
+
 LOCK_STEP_TICK_S, WIRE_TICK_S = 0.01, 0.002
 SEEDS = (1, 3)
 FRECHET_M = 1.5e-3

@@ -9,6 +9,8 @@ import pytest
 from sim_twin.paired import DisturbedError, Kind, Pair
 from tests.support.loopback import own_address
 
+pytestmark = pytest.mark.realtime
+
 FRECHET_M = 3e-3
 OFFSET_S = 0.05
 

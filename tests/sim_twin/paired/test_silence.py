@@ -17,6 +17,8 @@ from sim_twin.controller.trace import read_trace
 from sim_twin.paired.ride import wired_rig
 from tests.support.loopback import own_address
 
+pytestmark = pytest.mark.realtime
+
 AHEAD = Heading(heading_rad=math.pi / 2, distance_m=0.022, height_m=0.225)
 SLOW_M_S = 0.05
 SILENT_S, REST_S, STILL_RAD_S = 1.0, 0.4, 0.005

@@ -14,6 +14,8 @@ from sim_twin.controller.script.builtins import Sockets
 from sim_twin.controller.script.builtins.sockets import N_CONNECTIONS
 from tests.support.scripts import SLICE_S, ScriptRun, program
 
+pytestmark = pytest.mark.realtime
+
 
 @contextmanager
 def session(body):

@@ -2,8 +2,12 @@
 
 from time import process_time
 
+import pytest
+
 from sim_twin.controller.script import Interpreter, Status, parse_program
 from sim_twin.controller.script.builtins import time_builtins
+
+pytestmark = pytest.mark.realtime
 
 
 def best_of(n, call):

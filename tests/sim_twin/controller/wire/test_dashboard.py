@@ -5,6 +5,8 @@ import pytest
 
 from sim_twin.controller.wire import ControllerVersion, Outcome
 
+pytestmark = pytest.mark.realtime
+
 NOT_REMOTE = (
     "Command is not allowed due to safety reasons, "
     "please switch robot to Remote Control mode and reconnect to port 29999"

@@ -5,6 +5,8 @@ import pytest
 
 from sim_twin.controller.wire import GripperMeasurement, GripperRequest
 
+pytestmark = pytest.mark.realtime
+
 
 @pytest.fixture
 def client(bench):

@@ -9,6 +9,8 @@ from sim_twin.controller.wire.peer import Budget
 from sim_twin.controller.wire.reactor import Reactor
 from tests.support.wire_doubles import HOST, Client
 
+pytestmark = pytest.mark.realtime
+
 
 class Echo:
     """Sends back what it receives, and notes what happens."""

@@ -11,6 +11,8 @@ from sim_twin.controller.wire.rtde_codec import Level
 from sim_twin.controller.wire.rtde_server import RtdeServer
 from tests.support.wire_doubles import HOST, Client
 
+pytestmark = pytest.mark.realtime
+
 NAN = float("nan")
 
 

@@ -8,6 +8,8 @@ import pytest
 from sim_twin.controller.wire import ControllerVersion, PortKind
 from sim_twin.controller.wire.primary_messages import pack_text
 
+pytestmark = pytest.mark.realtime
+
 WRITABLE = {30001: PortKind.PRIMARY, 30002: PortKind.SECONDARY, 30003: PortKind.REALTIME}
 PROGRAM = "def p():\n  sync()\nend\n"
 

@@ -5,6 +5,8 @@ import pytest
 from sim_twin.controller.wire import ControllerVersion, Wires
 from tests.support.wire_doubles import HOST, Robot
 
+pytestmark = pytest.mark.realtime
+
 NUMBERS = {29999, 30001, 30002, 30003, 30004, 30011, 30012, 30013, 63352}
 
 
