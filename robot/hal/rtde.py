@@ -30,7 +30,16 @@ from robot.hal.rtde_set_up import require, status_of
 from robot.hal.ur_calls import bounded, named
 from robot.hal.ur_checks import check_facts, check_pose, check_serial
 from robot.hal.ur_primary import read_facts
-from robot.hal.ur_state import Runtime, UrStatus, check_ready, check_version, mode_of, parse_version, why_refused
+from robot.hal.ur_state import (
+    Runtime,
+    UrStatus,
+    check_ready,
+    check_version,
+    mode_of,
+    parse_version,
+    why_refused,
+    why_slowed,
+)
 from robot.messages import ArmCommand, ArmMode, ArmSpec, ArmState, GripState, Vec6
 
 __all__ = ["RtdeArm"]
@@ -85,7 +94,7 @@ class RtdeArm:
         self._command = RtdeCommand(
             address=address, tool=arm.tool, links=self.links, pins=self._pins, readers=self._reading
         )
-        self._runtime = Runtime.STOPPED
+        self._runtime, self._speed_fraction = Runtime.STOPPED, 1.0
         """As the last state read told."""
         self._modes, self._mode = (-1, 0), mode_of(-1, 0)
         self._is_hand_asked = False
@@ -168,7 +177,7 @@ class RtdeArm:
         self._require_link()
         self._note_freshness(receive)
         grip = self._grip_where_powered()
-        self._runtime = int(receive.getRuntimeState())
+        self._runtime, self._speed_fraction = int(receive.getRuntimeState()), receive.getTargetSpeedFraction()
         modes = receive.getRobotMode(), receive.getSafetyStatusBits()
         if modes != self._modes:
             self._modes, self._mode = modes, mode_of(*modes)
@@ -192,7 +201,8 @@ class RtdeArm:
 
         Raises:
             NotEngagedError: nobody took command, or the arm was stopped since.
-            ArmRefusedError: the program that obeys has ended, or the controller did not take it.
+            ArmRefusedError: the program that obeys has ended, the controller did not take it, or somebody has slowed
+                the arm down meanwhile.
             StaleStateError: the link was cut, or sending took so long that the client may have reconnected.
             WireError: the hand does not answer.
         """
@@ -201,6 +211,9 @@ class RtdeArm:
         self._require_link()
         if self._runtime != Runtime.PLAYING:
             self._refuse("servoJ")
+        slowed = why_slowed(self._modes[1], self._speed_fraction)
+        if slowed is not None:
+            raise ArmRefusedError(f"servoJ: {slowed}")
         servo, begun_ns = self._arm.servo, monotonic_ns()
         taken = self._command.control.servoJ(
             list(command.q_rad), 0.0, 0.0, 1.0 / RATE_HZ, servo.lookahead_s, servo.gain

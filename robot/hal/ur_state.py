@@ -21,6 +21,7 @@ __all__ = [
     "mode_of",
     "parse_version",
     "why_refused",
+    "why_slowed",
 ]
 
 RUNNING, IDLE, POWER_OFF = 7, 5, 3
@@ -108,16 +109,22 @@ def check_ready(status: UrStatus, *, is_remote: bool) -> None:
         raise ArmRefusedError(f"expected an arm that runs and is not stopped, came: {why_refused(status)}")
     if status.runtime not in (Runtime.STOPPED, Runtime.STOPPING):
         raise ArmRefusedError("expected no program on the arm, one is running: whoever started it must stop it")
-    if status.safety_bits & _REDUCED:
-        raise ArmRefusedError(
+    slowed = why_slowed(status.safety_bits, status.speed_fraction)
+    if slowed is not None:
+        raise ArmRefusedError(slowed)
+
+
+def why_slowed(safety_bits: int, speed_fraction: float) -> str | None:
+    """Return what keeps the controller from following as fast as it is asked to, in words; None where nothing does."""
+    if safety_bits & _REDUCED:
+        return (
             "expected the arm in normal mode, it is in reduced mode, whose limits are narrower than those it was "
             "compared with: leave that mode at the cell"
         )
-    if status.speed_fraction < FULL_SPEED:
-        percent = round(100 * status.speed_fraction)
-        raise ArmRefusedError(
-            f"expected the speed slider at 100 %, it is at {percent} %: motion would trail its targets"
-        )
+    if speed_fraction < FULL_SPEED:
+        percent = round(100 * speed_fraction)
+        return f"expected the speed slider at 100 %, it is at {percent} %: motion would trail its targets"
+    return None
 
 
 def parse_version(text: str) -> tuple[int, ...]:

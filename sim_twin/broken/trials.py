@@ -165,6 +165,10 @@ TRIALS: tuple[Trial, ...] = (
     Trial(name="program_stopped", begin=_by("program_stop")),
     Trial(name="servo_process_hung_and_jogged", begin=_hang, hold_s=0.6, is_jogged=True, is_brief=True),
     Trial(
+        name="speed_slider_lowered", begin=_by("slider", share=0.3), end=_by("slider", share=1.0), bars=True,
+    ),
+    Trial(name="reduced_mode", begin=_by("reduced", on=True), end=_by("reduced", on=False), bars=True),
+    Trial(
         name="remote_control_off", begin=_by("remote", on=False), end=_by("remote", on=True), is_stop=False, bars=True
     ),
     Trial(

@@ -28,6 +28,7 @@ Torque: TypeAlias = Annotated[float, msgspec.Meta(ge=-300.0, le=300.0)]
 Torques: TypeAlias = tuple[Torque, Torque, Torque, Torque, Torque, Torque]
 Deviation: TypeAlias = Annotated[float, msgspec.Meta(ge=0.0, le=0.5)]
 OffNominal: TypeAlias = Annotated[float, msgspec.Meta(ge=0.0, le=100.0)]
+Share: TypeAlias = Annotated[float, msgspec.Meta(ge=0.0, le=1.0)]
 Bits: TypeAlias = Annotated[int, msgspec.Meta(ge=0, lt=1 << N_DIGITAL)]
 Lines: TypeAlias = Annotated[int, msgspec.Meta(ge=1, le=1000)]
 
@@ -81,6 +82,7 @@ class Faults:
             "reserve": self.reserve,
             "safeguard_close": lambda: self._happen(Event.SAFEGUARD_CLOSED),
             "safeguard_open": lambda: self._happen(Event.SAFEGUARD_OPENED),
+            "slider": self.slider,
             "ticks": self.tick_times,
             "truth": self.truth,
             "violation": lambda: self._happen(Event.VIOLATION),
@@ -190,6 +192,10 @@ class Faults:
     def force_inputs(self, bits: Bits = 0) -> None:
         """Let these digital inputs be on, whatever the table says."""
         self._robot.forced_inputs = bits
+
+    def slider(self, share: Share = 1.0) -> None:
+        """Let somebody at the pendant move the speed slider."""
+        self._robot.machine.drive.core.pace.set_slider(share)
 
     def push(self, nm: Torques | None = None) -> None:
         """Push on the joints from outside, as a person would; nothing ends it."""

@@ -198,3 +198,26 @@ def test_a_program_that_only_a_person_can_end_is_no_confirmed_stop(controller, a
     assert not arm.stop()
     controller.fault("safeguard_close")
     controller.fault("remote", on=True)
+
+
+@pytest.mark.parametrize(
+    ("fault", "on", "off", "word"),
+    [
+        ("slider", {"share": 0.5}, {"share": 1.0}, "speed slider at 100 %, it is at 50 %"),
+        ("reduced", {"on": True}, {"on": False}, "reduced mode"),
+    ],
+    ids=["slider", "reduced"],
+)
+def test_an_arm_that_somebody_slows_down_in_command_is_refused(controller, arm, fault, on, off, word):
+    with undisturbed():
+        arm.engage()
+        drive(arm, 0.08, 20)
+    controller.fault(fault, **on)
+    try:
+        with pytest.raises(ArmRefusedError, match=word):
+            drive(arm, 0.08, 50)
+        assert arm.stop()
+        with pytest.raises(ArmRefusedError, match=word):
+            arm.engage()
+    finally:
+        controller.fault(fault, **off)
