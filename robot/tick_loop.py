@@ -13,8 +13,8 @@ from robot.errors import ArmRefusedError, RobotConfigError, StaleStateError, Wir
 from robot.hal.protocols import Arm
 from robot.kinematics import ToolChain
 from robot.messages import ArmCommand, ArmState, GripCommand, Intent, Vec3, Verdict
-from robot.motion import Mover
-from robot.safety import Gate, GateLimits, Reason
+from robot.motion import Approach, Mover
+from robot.safety import Braking, Clearance, Gate, GateLimits, Hard, Reason, StopCheck
 
 __all__ = ["Stride", "TickLoop"]
 
@@ -72,9 +72,13 @@ class TickLoop:
         table_m = scenario.table.height_m
         self._arm = arm
         self._cell = Cell(scenario=scenario, rule_sets=rule_sets, arm=config)
-        self._mover = Mover(config, table_m=table_m, tick_s=rig.tick_s)
         limits = GateLimits.of(config, arm.spec, table_m=table_m, tick_s=rig.tick_s)
-        self._gate = Gate(arm=arm, limits=limits, chain=ToolChain(config), when_latched=when_latched)
+        clearance = Clearance(config, scenario, hard=Hard())
+        braking = Braking()
+        approach = Approach(config, clearance, braking=braking)
+        self._mover = Mover(config, table_m=table_m, tick_s=rig.tick_s, approach=approach)
+        stops = StopCheck(config, clearance, limits=limits, tick_s=rig.tick_s, braking=braking)
+        self._gate = Gate(arm=arm, limits=limits, chain=ToolChain(config), when_latched=when_latched, stops=stops)
         self._tick_s, self._tick_ns = rig.tick_s, round(rig.tick_s * 1e9)
         self.state: ArmState
         self._read_ns = self._epoch = 0

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from config.arm import ArmConfig
 from robot.geometry import inside_box
 from robot.messages import ArmState, Heading, Intent, JointTarget, Twist, Vec3, Vec6
+from robot.motion.approach import Approach
 from robot.motion.contact import ContactGuard
 from robot.motion.follower import Follower
 from robot.motion.target import (
@@ -34,7 +35,16 @@ RESEAT_SHARE = 0.9
 class Mover:
     """Carries the target from intent to intent. `seed` forgets everything before."""
 
-    def __init__(self, arm: ArmConfig, *, table_m: float, tick_s: float) -> None:
+    def __init__(self, arm: ArmConfig, *, table_m: float, tick_s: float, approach: Approach | None = None) -> None:
+        """Put the parts together.
+
+        Args:
+            arm: the arm's file.
+            table_m: height of the table's top, base frame.
+            tick_s: how long a tick is.
+            approach: what keeps targets clear of bodies and singular postures; None where there are none.
+        """
+        self._approach = approach
         self._limits = TargetLimits.of(arm, table_m)
         self._follower = Follower(arm, tick_s=tick_s)
         self._contact = ContactGuard(arm)
@@ -123,7 +133,7 @@ class Mover:
             back = self._back_inside(state.tcp_position_m)
         follower.seed(back)
         self._trail.seed(back)
-        follower.aim(fence(target_m, state.tcp_position_m, self._limits).position_m, yaw)
+        follower.aim(self._clear(fence(target_m, state.tcp_position_m, self._limits).position_m, yaw), yaw)
         return back
 
     def _back_inside(self, measured_m: Vec3) -> Vec6:
@@ -149,8 +159,33 @@ class Mover:
             self._limiters.append("contact")
         fenced = self._fenced(eased, state)
         self._limiters.extend(fenced.limiters)
-        if not self._follower.aim(fenced.position_m, yaw_rad):
+        place_m = self._clear(fenced.position_m, yaw_rad)
+        tilted_rad = None if self._follower.is_upright else self._follower.joint_target_rad
+        if not self._follower.aim(place_m, yaw_rad):
             self._limiters.append("unreachable")
+        elif tilted_rad is not None and not self._follower.is_upright:
+            self._aim_clear(tilted_rad, self._follower.joint_target_rad)
+
+    def _clear(self, target_m: Vec3, yaw_rad: float) -> Vec3:
+        """Keep the target of an upright tool from leading into bodies and singular postures."""
+        follower, approach = self._follower, self._approach
+        if approach is None or not follower.is_upright:
+            return target_m
+        at_m = follower.target_m
+        place_m, because = approach.clear_place(
+            at_m, target_m, now_rad=follower.q_rad, joints_at=lambda p, seed: follower.joints_at(p, yaw_rad, seed)
+        )
+        if because is not None:
+            self._limiters.append(because)
+        return place_m
+
+    def _aim_clear(self, now: Vec6, wanted: Vec6) -> None:
+        """Aim at joints, as far as the way there is clear of bodies."""
+        if self._approach is not None:
+            wanted, because = self._approach.clear_joints(now, wanted)
+            if because is not None:
+                self._limiters.append(because)
+        self._follower.aim_joints(wanted)
 
     def _aim_joints(self, wanted_rad: Vec6, state: ArmState, duration_s: float) -> None:
         """Move the joint target towards given joints, the tool by no more than a step and inside the fences."""
@@ -177,7 +212,7 @@ class Mover:
         if fenced.limiters or lowest_m < limits.tip_min_m:
             self._limiters.extend(fenced.limiters or ("table",))
             return
-        follower.aim_joints(q)
+        self._aim_clear(now, q)
 
     def _fenced(self, target_m: Vec3, state: ArmState) -> Shaped:
         """Keep a target inside the workspace and on the leash; where that is held is found only if it matters."""
