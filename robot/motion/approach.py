@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from config.arm import ArmConfig
+from robot.kinematics import ToolChain
 from robot.messages import Vec3, Vec6
 from robot.safety import Braking, Clearance
 
@@ -24,6 +25,8 @@ Inverse = Callable[[Vec3, Vec6], Vec6 | None]
 DAMPING = 1e-4
 ROUNDS = 4
 HALVINGS = 4
+FAR_AHEAD_M, CORNER_M = 0.06, 0.02
+"""A free tool trails its target by less; one that is held up may cut a corner, if a body is so near."""
 TOLERANCE_M = 5e-4
 """What a step past a curved wall may lose of a margin."""
 EASE = 1e-3
@@ -102,6 +105,7 @@ class Approach:
     ) -> None:
         self._arm, self._clearance = arm, clearance
         self._speed_m_s, self._braking_m_s2 = arm.motion.speed_m_s, arm.motion.acceleration_m_s2
+        self._chain = ToolChain(arm)
         self._workspace_m = arm.motion.workspace_m
         self._stop_rad_s2 = braking.least_rad_s2
         self._at_m: Vec3 | None = None
@@ -124,12 +128,36 @@ class Approach:
             return target_m, None
         q_at = self._q if at_m == self._at_m else joints_at(at_m, now_rad)
         if q_at is None:
-            return target_m, None
+            at_m, q_at = self._chain.tcp(now_rad), now_rad
         q = joints_at(target_m, q_at)
         overrun_m = 0.0 if q is None else self._overrun_m(q_at, q, math.dist(at_m, target_m))
         if q is not None and overrun_m == 0.0 and self._is_far(self._rooms(q_at), self._rooms(q)):
-            return self._take(target_m, q), None
-        return self._yield(at_m, target_m, q_at, overrun_m, joints_at)
+            place_m, because = self._take(target_m, q), None
+        else:
+            place_m, because = self._yield(at_m, target_m, q_at, overrun_m, joints_at)
+        return self._uncut(place_m, because, now_rad, joints_at)
+
+    def _uncut(self, place_m: Vec3, because: str | None, now_rad: Vec6, joints_at: Inverse) -> tuple[Vec3, str | None]:
+        """Draw a target that runs far ahead of a tool near a body to the tool's own side of it: no corner is cut."""
+        now_m = self._chain.tcp(now_rad)
+        is_far_ahead = math.dist(place_m, now_m) >= FAR_AHEAD_M
+        if not is_far_ahead and self._rooms_there[0] > CORNER_M:
+            return place_m, because
+        if self._clearance.gap(now_rad) > (CORNER_M if is_far_ahead else self._margins.clearance_m - TOLERANCE_M):
+            return place_m, because
+        ahead = [b - a for a, b in zip(now_m, place_m, strict=True)]
+        J = self._clearance.tool_jacobian(now_rad)
+        margin_m = self._margins.clearance_m
+        walls = [
+            Wall(w.name, w.room, tuple(_over_tool(w.slope, J)), 1.0)
+            for w in self._bodies(now_rad, margin_m, _length(ahead))
+        ]
+        left, blamed = yielding(ahead, walls)
+        if blamed is None:
+            return place_m, because
+        place_m = (now_m[0] + left[0], now_m[1] + left[1], now_m[2] + left[2])
+        q = joints_at(place_m, now_rad)
+        return (now_m if q is None else self._take(place_m, q)), blamed
 
     def _take(self, place_m: Vec3, q: Vec6) -> Vec3:
         self._at_m, self._q = place_m, q
