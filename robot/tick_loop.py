@@ -16,7 +16,7 @@ from robot.messages import ArmCommand, ArmState, GripCommand, Intent, Vec3, Verd
 from robot.motion import Approach, Mover
 from robot.safety import Braking, Clearance, Gate, GateLimits, Hard, Reason, StopCheck
 
-__all__ = ["Stride", "TickLoop"]
+__all__ = ["Stride", "TickLoop", "guarded"]
 
 WHOLE_TICKS = 1e-6
 
@@ -35,6 +35,25 @@ class Stride(msgspec.Struct, frozen=True, kw_only=True):
     is_in_contact: bool
     verdict: Verdict | None = None
     """The gate's refusal, if it refused."""
+
+
+def guarded(
+    *,
+    arm: Arm,
+    config: ArmConfig,
+    scenario: Scenario,
+    rig: Rig,
+    when_latched: Callable[[Verdict], object] | None,
+) -> tuple[Mover, Gate]:
+    """Return motion and gate of one arm at one table, bodies kept apart by both; of the same distances each its own."""
+    table_m, braking = scenario.table.height_m, Braking()
+    limits = GateLimits.of(config, arm.spec, table_m=table_m, tick_s=rig.tick_s)
+    approach = Approach(config, Clearance(config, scenario, hard=Hard()), braking=braking)
+    stops = StopCheck(
+        config, Clearance(config, scenario, hard=Hard()), limits=limits, tick_s=rig.tick_s, braking=braking
+    )
+    mover = Mover(config, table_m=table_m, tick_s=rig.tick_s, approach=approach)
+    return mover, Gate(arm=arm, limits=limits, chain=ToolChain(config), when_latched=when_latched, stops=stops)
 
 
 class TickLoop:
@@ -69,16 +88,9 @@ class TickLoop:
         """
         if abs(arm.spec.rate_hz * rig.tick_s - 1.0) > WHOLE_TICKS:
             raise RobotConfigError(f"rig {rig.name}: tick {rig.tick_s} s, the plant's is {1 / arm.spec.rate_hz} s")
-        table_m = scenario.table.height_m
         self._arm = arm
         self._cell = Cell(scenario=scenario, rule_sets=rule_sets, arm=config)
-        limits = GateLimits.of(config, arm.spec, table_m=table_m, tick_s=rig.tick_s)
-        clearance = Clearance(config, scenario, hard=Hard())
-        braking = Braking()
-        approach = Approach(config, clearance, braking=braking)
-        self._mover = Mover(config, table_m=table_m, tick_s=rig.tick_s, approach=approach)
-        stops = StopCheck(config, clearance, limits=limits, tick_s=rig.tick_s, braking=braking)
-        self._gate = Gate(arm=arm, limits=limits, chain=ToolChain(config), when_latched=when_latched, stops=stops)
+        self._mover, self._gate = guarded(arm=arm, config=config, scenario=scenario, rig=rig, when_latched=when_latched)
         self._tick_s, self._tick_ns = rig.tick_s, round(rig.tick_s * 1e9)
         self.state: ArmState
         self._read_ns = self._epoch = 0

@@ -137,8 +137,10 @@ class StopCheck:
         return None
 
     def _too_near(self, q: Vec6, gap_m: float) -> Refusal:
-        pair = min(self._clearance.closest(q, within_m=gap_m + FINE_M), key=lambda c: c.gap_m).pair
-        detail = f"expected {pair.part} clear of {pair.other} on the way to a stop, it would be {-gap_m:.4f} m too near"
+        found = self._clearance.closest(q, within_m=gap_m + FINE_M)
+        who = min(found, key=lambda c: c.gap_m).pair if found else None
+        what = "bodies apart" if who is None else f"{who.part} clear of {who.other}"
+        detail = f"expected {what} on the way to a stop, it would be {-gap_m:.4f} m too near"
         return Refusal(Reason.CLEARANCE, detail, -gap_m)
 
 

@@ -41,7 +41,7 @@ def stop_end(q_rad: Vec6, qd_rad_s: Vec6, deceleration_rad_s2: float) -> Vec6:
 
 
 def stop_span(
-    commanded: tuple[Vec6, Vec6], measured: tuple[Vec6, Vec6], braking: Braking
+    commanded: tuple[Vec6, Vec6], measured: tuple[Vec6, Vec6], braking: Braking, *, tick_s: float
 ) -> tuple[tuple[float, float], ...]:
     """Return between which angles each joint comes to rest, whether it follows its commands at once or trails them.
 
@@ -49,13 +49,17 @@ def stop_span(
         commanded: joints and speeds asked of the arm.
         measured: joints and speeds that it has.
         braking: how hard it stops, at best and at worst.
+        tick_s: how long a tick is: an arm that brakes in steps loses the first step's speed at once.
 
     Returns:
         Least and greatest angle of each joint.
     """
-    ends = [
-        stop_end(*state, deceleration)
-        for state in (commanded, measured)
-        for deceleration in (braking.deceleration_rad_s2, braking.least_rad_s2)
-    ]
+    ends: list[Vec6] = []
+    for q, qd in (commanded, measured):
+        soon = stop_end(q, qd, braking.deceleration_rad_s2)
+        a, b, c, d, e, f = [
+            x - v * min(tick_s, stop_time_s(qd, braking.deceleration_rad_s2)) / 2.0
+            for x, v in zip(soon, qd, strict=True)
+        ]
+        ends += [(a, b, c, d, e, f), soon, stop_end(q, qd, braking.least_rad_s2)]
     return tuple((min(angles), max(angles)) for angles in zip(*ends, strict=True))
