@@ -9,6 +9,7 @@ from time import perf_counter, perf_counter_ns
 import numpy as np
 import placo
 
+from config.limited import limited
 from config.loader import resolve
 from config.resolved import Resolved
 from robot.bench import BenchReport, BenchResult, bench_report
@@ -63,7 +64,12 @@ class _Drive:
         self._arm, tool = self._plant.arm, resolved.arm.tool
         self._arm.connect()
         self._mover, self._gate = guarded(
-            arm=self._arm, config=resolved.arm, scenario=resolved.scenario, rig=resolved.rig, when_latched=None
+            arm=self._arm,
+            config=limited(resolved.arm, resolved.profile),
+            scenario=resolved.scenario,
+            rig=resolved.rig,
+            profile=resolved.profile,
+            when_latched=None,
         )
         self._clearance = Clearance(resolved.arm, resolved.scenario, hard=Hard())
         self._bare = _bare_solve(resolved)

@@ -30,7 +30,7 @@ FAR_AHEAD_M, CORNER_M = 0.06, 0.02
 TOLERANCE_M = 5e-4
 """What a step past a curved wall may lose of a margin."""
 EASE = 1e-3
-SHARE, SINGULAR_SHARE = 0.5, 0.25
+SHARE, SINGULAR_SHARE = 0.6, 0.25
 """Towards a singularity the joints go the faster the nearer it is: the tool is slowed sooner."""
 """A step beside a wall that is too near already leads away by as much."""
 DIFFERENCE_RAD = 1e-6
@@ -240,7 +240,7 @@ class Approach:
     def _bodies(self, q: Vec6, margin_m: float, far: float) -> Iterator[Wall]:
         """Yield what is near, its room and its slope over the joints."""
         for c in self._clearance.closest(q, within_m=margin_m + 3.0 * far):
-            yield Wall("clearance", c.gap_m - margin_m, c.slope_m_rad)
+            yield Wall("clearance", c.gap_m - margin_m, c.slope_m_rad, SHARE)
 
     def _singular(self, q: Vec6) -> Iterator[Wall]:
         here = singular_room(self._arm, q)

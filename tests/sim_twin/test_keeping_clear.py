@@ -7,6 +7,7 @@ import pytest
 from msgspec.structs import replace
 
 import sim_twin.plant
+from config.limits import Workspace
 from config.loader import resolve
 from config.scenario import Box
 from robot.messages import ArmCommand, GripCommand, JointTarget, Twist
@@ -21,6 +22,10 @@ ROOM = replace(RESOLVED.arm.motion, workspace_m=((-0.85, -0.85, 0.015), (0.85, 0
 ARM = replace(RESOLVED.arm, motion=ROOM)
 """As the arm's file has it, but for fences so wide that bodies and reach are what holds it."""
 TOWER = Box(name="tower", position_m=(0.62, 0.0), colour=(0.5, 0.5, 0.5), inner_m=(0.05, 0.3), height_m=0.35)
+FREE = replace(
+    RESOLVED.limits,
+    profiles=tuple(replace(profile, workspace=Workspace()) for profile in RESOLVED.limits.profiles),
+)
 OPEN = replace(RESOLVED.scenario, workspace_m=None)
 BUILT_UP = replace(OPEN, boxes=(*OPEN.boxes, TOWER))
 SPEED_M_S = 0.4
@@ -31,9 +36,9 @@ class Drive:
     """A station on the twin, and what of its arm was too near to what, by distances of the test's own."""
 
     def __init__(self, scenario):
-        self.station, self.plant = open_twin(replace(RESOLVED, arm=ARM, scenario=scenario))
+        self.station, self.plant = open_twin(replace(RESOLVED, arm=ARM, scenario=scenario, limits=FREE))
         self.station.reset(seed=0, epoch=0)
-        self.clearance = Clearance(ARM, scenario, hard=Hard())
+        self.clearance = Clearance(ARM, scenario, hard=Hard(own_m=0.01, table_m=0.01, thing_m=0.01))
         self.limiters, self.least_gap_m = set(), math.inf
 
     def go(self, intent, n):
