@@ -5,7 +5,7 @@ from robot.safety.checks import Reason, Refusal
 from robot.safety.clearance import Clearance
 from robot.safety.collision_model import Hard
 from robot.safety.gate import Gate
-from robot.safety.limits import GateLimits
+from robot.safety.limits import GateLimits, check_profile_fits
 from robot.safety.stop_check import StopCheck
 from robot.safety.stopping import Braking
 
@@ -22,4 +22,5 @@ __all__ = [
     "Refusal",
     "StopCheck",
     "TooManyLatchesError",
+    "check_profile_fits",
 ]
