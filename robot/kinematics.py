@@ -1,8 +1,8 @@
 """Where the tool is for given joints, and which joints bring it somewhere: placo on the arm's own model.
 
 The forward path that runs every tick is plain floats on the Denavit-Hartenberg rows (about 1 us); the inverse is placo
-on the MJCF that the twin is built from. A test holds all of them together to 1e-6 m. Loops of 2 ms ask a closed form
-before placo, and a test holds it to placo's answers.
+on the MJCF that the twin is built from. A test holds all of them together to 1e-6 m. Loops ask a closed form before
+placo, and a test holds it to placo's answers.
 """
 
 import math
@@ -54,6 +54,7 @@ class ToolChain:
         x, y, z = arm.tool.tcp_m
         self._tip = (x, y, z + arm.tool.tip_below_tcp_m)
         self._tip_m = arm.tool.tip_below_tcp_m
+        self._is_axial = x == y == 0.0 < z
         self._elbow = elbow_point(arm)
         self._finger_m = arm.tool.stroke_m / 2 + arm.tool.pad_size_m[0]
 
@@ -83,13 +84,9 @@ class ToolChain:
         return (x, y, z), (tx, ty, tz)
 
     def tcp_and_lowest(self, q_rad: Vec6) -> tuple[Vec3, float]:
-        """Return the tool centre point and the height of the lowest fingertip of an open hand, base frame, metres.
-
-        A tilted tool's lower finger hangs below the point between the tips by its reach times the sine of the tilt.
-        """
+        """Return the tool centre point and the height of the lowest fingertip of an open hand, base frame, metres."""
         tcp, tip = self.tcp_and_tip(q_rad)
-        cosine = (tcp[2] - tip[2]) / self._tip_m
-        return tcp, tip[2] - self._finger_m * math.sqrt(max(0.0, 1.0 - cosine * cosine))
+        return tcp, self.lowest_m(tcp, (tcp[2] - tip[2]) / self._tip_m)
 
     def points(self, q_rad: Vec6) -> tuple[tuple[Vec3, Vec3, Vec3], float]:
         """Return tool centre point, flange and elbow, base frame, metres, and how far the tool points down, -1 to 1.
@@ -97,7 +94,6 @@ class ToolChain:
         The last is the cosine of the angle between the approach axis and straight down.
         """
         x, y, z = self._tcp
-        tx, ty, tz = self._tip
         fx = fy = fz = ex = ey = ez = 0.0
         i = N_JOINTS
         for a, d, ca, sa in self._rows:
@@ -105,8 +101,6 @@ class ToolChain:
             s, c = math.sin(q_rad[i]), math.cos(q_rad[i])
             u, v = x + a, ca * y - sa * z
             x, y, z = c * u - s * v, s * u + c * v, sa * y + ca * z + d
-            u, v = tx + a, ca * ty - sa * tz
-            tx, ty, tz = c * u - s * v, s * u + c * v, sa * ty + ca * tz + d
             u, v = fx + a, ca * fy - sa * fz
             fx, fy, fz = c * u - s * v, s * u + c * v, sa * fy + ca * fz + d
             if i < N_TO_ELBOW:
@@ -114,7 +108,15 @@ class ToolChain:
                     ex, ey, ez = self._elbow
                 u, v = ex + a, ca * ey - sa * ez
                 ex, ey, ez = c * u - s * v, s * u + c * v, sa * ey + ca * ez + d
-        return ((x, y, z), (fx, fy, fz), (ex, ey, ez)), (z - tz) / self._tip_m
+        down = (fz - z) / self._tcp[2] if self._is_axial else (z - self.tcp_and_tip(q_rad)[1][2]) / self._tip_m
+        return ((x, y, z), (fx, fy, fz), (ex, ey, ez)), down
+
+    def lowest_m(self, tcp_m: Vec3, down: float) -> float:
+        """Return the height of the lowest fingertip of an open hand, metres, from what `points` returns.
+
+        A tilted tool's lower finger hangs below the point between the tips by its reach times the sine of the tilt.
+        """
+        return tcp_m[2] - down * self._tip_m - self._finger_m * math.sqrt(max(0.0, 1.0 - down * down))
 
     def quat(self, q_rad: Vec6) -> Quat:
         """Return the tool's turn, scalar first: the product of Rz(q_i) Rx(alpha_i) as unit quaternions."""

@@ -17,8 +17,8 @@ SPEED_SHARE = 0.95
 ALIGN_RAD = 0.01
 """A tool tilted or turned by less than this points down as far as motion cares; the next tick sets it right."""
 SWIFT_TICK_S = 0.005
-"""Shorter ticks than this, a real arm's and not the twin's, take the closed form of the inverse where the arm has one,
-and find the way to a new target one tick after it was set: the tick in which an intent begins has enough to do."""
+"""In shorter ticks than this, a real arm's and not the twin's, the way to a new target is found one tick after it was
+set: the tick in which an intent begins has enough to do."""
 STILL_RAD_S = 1e-3
 ALIGN_STEP_RAD = 0.35
 """Greatest change of any joint's target in one step while the tool is brought upright."""
@@ -47,7 +47,7 @@ class Follower:
         self._envelope = envelope
         self._fence_names = {fence.name for fence in envelope.fences}
         self._is_swift = tick_s < SWIFT_TICK_S
-        self._kinematics = Kinematics(arm, is_swift=self._is_swift)
+        self._kinematics = Kinematics(arm, is_swift=True)
         self._home_yaw_rad = arm.tool_yaw_rad
         self._tick_s = tick_s
         self._tool = Limiter(

@@ -157,7 +157,7 @@ class Mover:
             back = _along(follower.q_rad, change, share)
         follower.seed(back)
         self._trail.seed(back)
-        follower.aim(self._clear(fence(target_m, state.tcp_position_m, self._limits).position_m, yaw), yaw)
+        follower.aim(fence(target_m, state.tcp_position_m, self._limits).position_m, yaw)  # nearer to where it was
         return back
 
     def _back_inside(self, state: ArmState) -> Vec6:

@@ -6,7 +6,6 @@ from enum import StrEnum
 import msgspec
 
 from robot.geometry import inside_box
-from robot.kinematics import ToolChain
 from robot.messages import (
     ArmCommand,
     ArmMode,
@@ -16,6 +15,7 @@ from robot.messages import (
     Hold,
     JointTarget,
     Twist,
+    Vec3,
     Vec6,
 )
 from robot.safety.limits import GateLimits
@@ -186,9 +186,14 @@ def check_joint_speed(q_rad: Vec6, previous_rad: Vec6, limits: GateLimits) -> Re
     return None
 
 
-def check_tool(q_rad: Vec6, chain: ToolChain, limits: GateLimits) -> Refusal | None:
-    """Refuse joints that bring the tool centre point out of the workspace or a fingertip too near the table."""
-    tcp, lowest_m = chain.tcp_and_lowest(q_rad)
+def check_tool(tcp: Vec3, lowest_m: float, limits: GateLimits) -> Refusal | None:
+    """Refuse a tool centre point out of the workspace, or a fingertip too near the table.
+
+    Args:
+        tcp: where the command brings the tool centre point, base frame, metres.
+        lowest_m: how high the lowest fingertip is then.
+        limits: where they may be.
+    """
     low, high = limits.workspace_m
     if not inside_box(tcp, low, high):
         by = max(max(a - x, x - b) for a, x, b in zip(low, tcp, high, strict=True))

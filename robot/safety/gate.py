@@ -148,19 +148,20 @@ class Gate:
             refusal = (
                 check_joint_range(q, limits)
                 or check_joint_speed(q, self._q_rad, limits)
-                or check_tool(q, self._chain, limits)
+                or self._check_parts(q, state.q_rad)
                 or check_intent_age(self._intent_ns, now_ns, limits)
-                or self._check_envelope(q, state.q_rad)
                 or (None if self._stops is None else self._stops.check(q, self._q_rad, state))
             )
         return refusal or check_tracking(q, state.q_rad, limits)
 
-    def _check_envelope(self, q_rad: Vec6, measured_rad: Vec6) -> Refusal | None:
-        """Run the checks of the limits profile on joints that are in range and no faster than they may be."""
+    def _check_parts(self, q_rad: Vec6, measured_rad: Vec6) -> Refusal | None:
+        """Look at where joints lead that are in range and no faster than they may be, and hold the limits profile."""
         envelope, last_rad = self._envelope, self._q_rad
         points, down = self._chain.points(q_rad)
+        tcp = points[0]
         refusal = (
-            check_soft_margin(q_rad, last_rad, envelope)
+            check_tool(tcp, self._chain.lowest_m(tcp, down), self._limits)
+            or check_soft_margin(q_rad, last_rad, envelope)
             or check_joint_acceleration(q_rad, last_rad, self._q_before_rad, measured_rad, envelope)
             or check_fences(points, envelope)
             or check_cone(down, envelope)

@@ -208,14 +208,14 @@ def test_the_tool_passes_inside_the_workspace_and_not_a_tenth_of_a_millimetre_be
     for offset, passes in ((-1e-4, True), (1e-4, False)):
         at[axis] = limit[axis] + outwards * offset
         q = KINEMATICS.solve(tuple(at), HOME)
-        assert reason(check_tool(q, CHAIN, LIMITS)) is (None if passes else Reason.WORKSPACE)
+        assert reason(check_tool(*CHAIN.tcp_and_lowest(q), LIMITS)) is (None if passes else Reason.WORKSPACE)
 
 
 def test_upright_fingertips_pass_at_the_clearance_and_not_a_tenth_of_a_millimetre_lower():
     lowest = ARM.motion.table_clearance_m + ARM.tool.tip_below_tcp_m
     for offset, expected in ((1e-4, None), (-1e-4, Reason.TABLE)):
         q = KINEMATICS.solve((0.44, 0.0, lowest + offset), HOME)
-        assert reason(check_tool(q, CHAIN, LIMITS)) is expected
+        assert reason(check_tool(*CHAIN.tcp_and_lowest(q), LIMITS)) is expected
 
 
 def test_a_tilted_tool_keeps_its_lower_finger_clear_too():
@@ -226,15 +226,15 @@ def test_a_tilted_tool_keeps_its_lower_finger_clear_too():
     z = 0.05 - (CHAIN.tcp_and_tip(tilted_over(0.05))[1][2] - LIMITS.tip_min_m - 0.005)
     q = tilted_over(z)
     assert CHAIN.tcp_and_tip(q)[1][2] == pytest.approx(LIMITS.tip_min_m + 0.005, abs=1e-3)
-    assert reason(check_tool(q, CHAIN, LIMITS)) is Reason.TABLE
-    assert check_tool(tilted_over(z + 0.05), CHAIN, LIMITS) is None
+    assert reason(check_tool(*CHAIN.tcp_and_lowest(q), LIMITS)) is Reason.TABLE
+    assert check_tool(*CHAIN.tcp_and_lowest(tilted_over(z + 0.05)), LIMITS) is None
 
 
 @given(st.tuples(*[st.floats(-6.5, 6.5)] * 6))
 def test_whatever_passes_is_inside(q):
     if check_joint_range(q, LIMITS) is None:
         assert all(j.range_rad[0] <= v <= j.range_rad[1] for j, v in zip(ARM.joints, q, strict=True))
-    if check_tool(q, CHAIN, LIMITS) is None:
+    if check_tool(*CHAIN.tcp_and_lowest(q), LIMITS) is None:
         x, y, z = KINEMATICS.tcp(q)
         (x0, y0, z0), (x1, y1, z1) = LIMITS.workspace_m
         assert x0 <= x <= x1
