@@ -174,6 +174,11 @@ class LocalStation:
         return self._world.identity
 
     @property
+    def measured(self) -> ArmState:
+        """What the arm measured last, at the end of a step, a reset or engaging."""
+        return self._measured
+
+    @property
     def model_sha256(self) -> str | None:
         """Digest of the world's model, where it is a simulated one in this process."""
         return getattr(self._world, "model_sha256", None)
