@@ -3,9 +3,11 @@
 from pathlib import Path
 
 from config.resolved import Resolved
+from config.rig import Rig
 from robot.bus import open_session
 from robot.bus.twin_link import RemoteResetter, RemoteTruth
 from robot.errors import RobotConfigError
+from robot.hal.pendant import Pendant
 from robot.hal.protocols import Resetter, SceneTruth
 from robot.local_station import LocalStation, Perceives
 from robot.messages import PlantIdentity
@@ -57,12 +59,19 @@ def build_lab_station(resolved: Resolved, perception: Perceives, *, pictures: Pa
         )
         world = _LabWorld(loop=loop, truth=truth, resetter=by_person)
         station = PersonResetStation(
-            world=world, loop=loop, perception=perception, arm=resolved.arm, scenario=resolved.scenario, rig=rig
-        )
+            world=world, loop=loop, perception=perception, arm=resolved.arm, scenario=resolved.scenario, rig=rig,
+            cell_shows=_pendant_of(rig),
+        )  # fmt: skip
         station.prepare(by_person, resolved.arm.home_rad)
         return station
     resetter = RemoteResetter(session, rig.expected.serial, loop=loop, truth=truth)
     world = _LabWorld(loop=loop, truth=truth, resetter=resetter)
     return LocalStation(
-        world=world, loop=loop, perception=perception, arm=resolved.arm, scenario=resolved.scenario, rig=rig
-    )
+        world=world, loop=loop, perception=perception, arm=resolved.arm, scenario=resolved.scenario, rig=rig,
+        cell_shows=_pendant_of(rig),
+    )  # fmt: skip
+
+
+def _pendant_of(rig: Rig) -> Pendant | None:
+    """Return where a code for arming is shown: on a real arm's pendant. A virtual one has none that anybody sees."""
+    return Pendant(rig.address) if rig.address is not None and rig.expected.kind == "real" else None

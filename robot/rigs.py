@@ -4,6 +4,7 @@ import inspect
 from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
+from time import monotonic_ns
 from typing import Any
 
 from config.arm import ArmConfig
@@ -47,6 +48,8 @@ def build_station(
     plant: Plant | None = None,
     heard_by: Callable[[str], None] | None = None,
     pictures: Path = Path("resets"),
+    cell_shows: Callable[[str], None] | None = None,
+    host_ns: Callable[[], int] = monotonic_ns,
 ) -> LocalStation:
     """Return the station of a resolved config, disarmed and not yet connected.
 
@@ -55,6 +58,8 @@ def build_station(
         plant: One that is already made, in place of the rig's.
         pictures: Folder for what a person who lays the table out needs to see.
         heard_by: A stopwatch's lap that hears of every tick, where the arm is held in this process.
+        cell_shows: Shows a text at the cell of an arm that is held in this process; a rig with a bus has its own.
+        host_ns: This process's monotonic time, for leases and answers at the cell; never for motion.
     """
     rig, arm, scenario = resolved.rig, resolved.arm, resolved.scenario
     check_usable(rig)
@@ -67,7 +72,10 @@ def build_station(
     if heard_by is not None:
         time_world(world, heard_by)
     loop = TickLoop(arm=world.arm, config=arm, scenario=scenario, rule_sets=resolved.rule_sets, rig=rig)
-    return LocalStation(world=world, loop=loop, perception=perception, arm=arm, scenario=scenario, rig=rig)
+    return LocalStation(
+        world=world, loop=loop, perception=perception, arm=arm, scenario=scenario, rig=rig, cell_shows=cell_shows,
+        host_ns=host_ns,
+    )  # fmt: skip
 
 
 def check_usable(rig: Rig) -> None:
