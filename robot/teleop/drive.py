@@ -27,6 +27,8 @@ STEP_S = 0.02
 FULL_M_S, FULL_RAD_S = 0.25, 0.8
 """Hand-guided speed: ISO 10218's reduced speed is 250 mm/s."""
 RAMP_S = 0.25
+LEASE_NS = 1_000_000_000
+"""A drive loop that did not come round for so long is gone: the arm is disarmed."""
 
 
 class DriveOptions(msgspec.Struct, frozen=True, kw_only=True):
@@ -41,6 +43,11 @@ class DriveOptions(msgspec.Struct, frozen=True, kw_only=True):
     preview: bool
     fast: bool
     json: bool
+
+    @property
+    def is_script(self) -> bool:
+        """Whether nobody is there: a file drives."""
+        return self.device.startswith("script")
 
 
 def run_drive(options: DriveOptions) -> None:
@@ -57,13 +64,14 @@ def run_drive(options: DriveOptions) -> None:
     with ExitStack() as stack:
         end = stack.enter_context(EndRequest())
         station = stack.enter_context(build_station(resolved))
+        station.take_lease(f"teleop by {device.name}", life_ns=None if options.is_script else LEASE_NS)
         _arm(station, resolved, seed=options.seed)
         readout = ReadOut(keys=device.keys, console=console, now_ns=monotonic_ns)
         stack.enter_context(readout)
         driver = Driver(
             station=station,
             device=device,
-            jog=Jog(_limits(resolved)),
+            jog=Jog(_limits(resolved, options.speed)),
             pace=pace,
             step_s=STEP_S,
             rearm=_Rearm(station, readout, device, seed=options.seed),
@@ -104,11 +112,12 @@ def _arm(station: LocalStation, resolved: Resolved, *, seed: int) -> None:
         station.reset(seed=seed, epoch=0)
 
 
-def _limits(resolved: Resolved) -> JogLimits:
+def _limits(resolved: Resolved, speed: float) -> JogLimits:
+    """Return how a driver drives: never faster than by hand-guided speed, the arm's own, or the profile's."""
     motion = resolved.arm.motion
     return JogLimits(
-        full_m_s=min(FULL_M_S, motion.speed_m_s),
-        full_rad_s=FULL_RAD_S,
+        full_m_s=speed * min(FULL_M_S, motion.speed_m_s, resolved.profile.speeds.tcp_m_s),
+        full_rad_s=speed * FULL_RAD_S,
         ramp_s=RAMP_S,
         deadline_s=motion.intent_max_age_s,
         step_s=STEP_S,
@@ -117,9 +126,8 @@ def _limits(resolved: Resolved) -> JogLimits:
 
 def _pace(resolved: Resolved, options: DriveOptions) -> Pace:
     """Return the driver's time: steps of a plant on a wire take theirs, a twin's are paced here."""
-    is_script = options.device.startswith("script")
     is_wired = resolved.rig.bus is not None
-    if options.fast and (is_wired or not is_script):
+    if options.fast and (is_wired or not options.is_script):
         raise RobotConfigError("--fast: expected a rig in lock-step and a script, for anybody else drives in real time")
     if is_wired:
         return Unpaced(step_s=STEP_S, now_ns=monotonic_ns)

@@ -6,7 +6,7 @@ from typing import Protocol
 import msgspec
 
 from robot.errors import NotEngagedError, SafetyError
-from robot.messages import ArmState, Grip, Hold, Intent, StationMode, StationState, StepResult, Verdict
+from robot.messages import ArmState, Grip, Hold, Intent, StationMode, StationState, StepResult, Vec3, Verdict
 from robot.station import Station
 from robot.teleop.device import Device, DriverInput
 from robot.teleop.jog import Jog
@@ -71,6 +71,8 @@ class DriveEnd(msgspec.Struct, frozen=True, kw_only=True):
     n_steps: int
     n_latches: int
     is_at_rest: bool
+    tcp_m: Vec3
+    """Where the tool was in the end."""
     limited: dict[str, int]
     """Steps that each limiter had a hand in."""
 
@@ -152,7 +154,11 @@ class Driver:
         finally:
             self._device.close()
         return DriveEnd(
-            n_steps=self._n_steps, n_latches=self._n_latches, is_at_rest=is_at_rest, limited=dict(self._limited)
+            n_steps=self._n_steps,
+            n_latches=self._n_latches,
+            is_at_rest=is_at_rest,
+            tcp_m=self._station.measured.tcp_position_m,
+            limited=dict(self._limited),
         )
 
     def _take_over(self) -> None:
