@@ -204,6 +204,11 @@ class LocalStation:
         return self._measured
 
     @property
+    def percept(self) -> Percept:
+        """What was perceived last."""
+        return self._percept
+
+    @property
     def model_sha256(self) -> str | None:
         """Digest of the world's model, where it is a simulated one in this process."""
         return getattr(self._world, "model_sha256", None)

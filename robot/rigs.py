@@ -5,7 +5,7 @@ from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
 from time import monotonic_ns
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from config.arm import ArmConfig
 from config.cell import CellConfig
@@ -19,7 +19,20 @@ from robot.safety import Operator
 from robot.tick_loop import TickLoop
 from robot.timed import time_world
 
-__all__ = ["build_operator", "build_plant", "build_station", "check_learnable", "check_usable", "load"]
+if TYPE_CHECKING:
+    from robot.teleop.preview import Shadow
+    from robot.teleop.view import View
+
+__all__ = [
+    "build_operator",
+    "build_plant",
+    "build_shadow",
+    "build_station",
+    "build_view",
+    "check_learnable",
+    "check_usable",
+    "load",
+]
 
 
 def load(import_string: str) -> Any:  # noqa: ANN401 - what a string names is known only at run time
@@ -116,6 +129,22 @@ def _require_perception(rig: Rig) -> str:
 def build_operator(rig: Rig) -> Operator | None:
     """Return who arms this rig's station without hardware, None where a person must."""
     return None if rig.operator is None else _make(rig.operator, "operator")
+
+
+def build_view(resolved: Resolved) -> "View | None":
+    """Return what shows arm and table while somebody drives, not yet opened; None where the rig names nothing."""
+    return None if resolved.rig.view is None else _make(resolved.rig.view, "view", resolved=resolved)
+
+
+def build_shadow(resolved: Resolved) -> "Shadow":
+    """Return what a driver's intents are tried on.
+
+    Raises:
+        RobotConfigError: the rig names nothing for it.
+    """
+    if resolved.rig.shadow is None:
+        raise RobotConfigError(f"rig {resolved.rig.name}: expected a shadow to try intents on, it names none")
+    return _make(resolved.rig.shadow, "shadow", resolved=resolved)
 
 
 def _make(import_string: str, what: str, **parts: object) -> Any:  # noqa: ANN401

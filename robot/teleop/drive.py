@@ -9,17 +9,19 @@ from rich.console import Console
 
 from config.loader import resolve
 from config.resolved import Resolved
-from robot.errors import RobotConfigError
+from robot.errors import RobotConfigError, RobotError
 from robot.local_station import LocalStation
 from robot.messages import StationMode, StationState
 from robot.person import PersonOperator, TerminalPerson
-from robot.rigs import build_operator, build_station
+from robot.rigs import build_operator, build_shadow, build_station, build_view
 from robot.teleop.device import Device, open_device
-from robot.teleop.driver import DriveEnd, Driver, Pace, Unpaced
+from robot.teleop.driver import DriveEnd, Driver, DriveView, Pace, Unpaced
 from robot.teleop.interrupt import EndRequest
 from robot.teleop.jog import Jog, JogLimits
 from robot.teleop.pace import WallPace
+from robot.teleop.preview import AheadPreview
 from robot.teleop.readout import ReadOut
+from robot.teleop.view import View
 
 __all__ = ["DriveOptions", "run_drive"]
 
@@ -27,6 +29,8 @@ STEP_S = 0.02
 FULL_M_S, FULL_RAD_S = 0.25, 0.8
 """Hand-guided speed: ISO 10218's reduced speed is 250 mm/s."""
 RAMP_S = 0.25
+AHEAD_S = 0.2
+"""How far a preview is ahead of the arm: longer than it takes to come to rest from full speed."""
 LEASE_NS = 1_000_000_000
 """A drive loop that did not come round for so long is gone: the arm is disarmed."""
 
@@ -66,6 +70,7 @@ def run_drive(options: DriveOptions) -> None:
         station = stack.enter_context(build_station(resolved))
         station.take_lease(f"teleop by {device.name}", life_ns=None if options.is_script else LEASE_NS)
         _arm(station, resolved, seed=options.seed)
+        view = _open_view(resolved, console, stack) if options.view else None
         readout = ReadOut(keys=device.keys, console=console, now_ns=monotonic_ns)
         stack.enter_context(readout)
         driver = Driver(
@@ -75,11 +80,44 @@ def run_drive(options: DriveOptions) -> None:
             pace=pace,
             step_s=STEP_S,
             rearm=_Rearm(station, readout, device, seed=options.seed),
-            tell=readout,
+            tell=_Shown(readout, view, station),
             should_stop=end,
+            preview=_open_preview(resolved, stack) if options.preview else None,
         )
         ended = driver.run()
     _tell(ended, as_json=options.json)
+
+
+class _Shown:
+    """Shows every step in the terminal and, where there is one, in the live view."""
+
+    def __init__(self, readout: ReadOut, view: View | None, station: LocalStation) -> None:
+        self._readout, self._view, self._station = readout, view, station
+
+    def __call__(self, view: DriveView) -> None:
+        self._readout(view)
+        if self._view is not None:
+            self._view.show(view.measured, self._station.percept)
+
+
+def _open_view(resolved: Resolved, console: Console, stack: ExitStack) -> View | None:
+    """Open the rig's live view. Where it cannot be shown the drive goes on without."""
+    view = build_view(resolved)
+    if view is None:
+        return None
+    stack.callback(view.close)
+    try:
+        console.print(f"live view: {view.open()}", highlight=False)
+    except RobotError as error:
+        console.print(f"no live view: {error}", highlight=False, markup=False)
+        return None
+    return view
+
+
+def _open_preview(resolved: Resolved, stack: ExitStack) -> AheadPreview:
+    shadow = build_shadow(resolved)
+    stack.callback(shadow.close)
+    return AheadPreview(shadow, n_ahead=round(AHEAD_S / STEP_S), step_s=STEP_S)
 
 
 class _Rearm:

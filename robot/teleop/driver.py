@@ -6,7 +6,7 @@ from typing import Protocol
 import msgspec
 
 from robot.errors import NotEngagedError, SafetyError
-from robot.messages import ArmState, Grip, Hold, Intent, StationMode, StationState, StepResult, Vec3, Verdict
+from robot.messages import ArmState, Grip, Hold, Intent, Percept, StationMode, StationState, StepResult, Vec3, Verdict
 from robot.station import Station
 from robot.teleop.device import Device, DriverInput
 from robot.teleop.jog import Jog
@@ -26,6 +26,11 @@ class DrivenStation(Station, Protocol):
         """The newest measurement."""
         ...
 
+    @property
+    def percept(self) -> Percept:
+        """What was perceived last."""
+        ...
+
 
 class Pace(Protocol):
     """The driver's time: it says what time it is, and lets a step's time pass where the plant does not."""
@@ -42,7 +47,7 @@ class Pace(Protocol):
 class Preview(Protocol):
     """What tries intents before they are sent."""
 
-    def offer(self, intent: Intent, measured: ArmState) -> tuple[Intent, Verdict | None]:
+    def offer(self, intent: Intent, measured: ArmState, percept: Percept) -> tuple[Intent, Verdict | None]:
         """Return what may be sent now, and why it is not what was asked where it was refused."""
         ...
 
@@ -174,7 +179,7 @@ class Driver:
         intent: Intent = self._jog.decide(asked, now_ns=now_ns, tcp_quat=measured.tcp_quat)
         refused = None
         if self._preview is not None:
-            intent, refused = self._preview.offer(intent, measured)
+            intent, refused = self._preview.offer(intent, measured, self._station.percept)
         result = self._step(intent)
         self._show(asked, now_ns, result, refused)
         return True
