@@ -11,8 +11,9 @@ from robot.hal.pendant import Pendant
 from robot.hal.protocols import Resetter, SceneTruth
 from robot.local_station import LocalStation, Perceives
 from robot.messages import PlantIdentity
+from robot.motion import AskedHand
 from robot.person import TerminalPerson
-from robot.person_reset import PersonResetter
+from robot.person_reset import PersonLook, PersonResetter
 from robot.person_station import PersonResetStation
 from robot.servo_client import ServoClient
 
@@ -22,7 +23,7 @@ __all__ = ["build_lab_station"]
 class _LabWorld:
     """The plant as the bus and the servo process know it (robot.local_station.World)."""
 
-    def __init__(self, *, loop: ServoClient, truth: SceneTruth, resetter: Resetter) -> None:
+    def __init__(self, *, loop: ServoClient, truth: SceneTruth | None, resetter: Resetter) -> None:
         self._loop = loop
         self.truth: SceneTruth | None = truth
         self.resetter = resetter
@@ -35,13 +36,16 @@ class _LabWorld:
         return self._loop.identity
 
 
-def build_lab_station(resolved: Resolved, perception: Perceives, *, pictures: Path) -> LocalStation:
+def build_lab_station(
+    resolved: Resolved, perception: Perceives, *, pictures: Path, is_driven: bool = False
+) -> LocalStation:
     """Return the station of a rig with a bus, disarmed; the bus is open, the arm not connected to.
 
     Args:
         resolved: rig, arm, scenario and rule sets.
         perception: what makes percepts.
         pictures: where a person who lays the table out finds what belongs where.
+        is_driven: a person drives; where a person lays the table out nobody else on the bus is needed then.
 
     Raises:
         RobotConfigError: the rig names no bus.
@@ -50,6 +54,8 @@ def build_lab_station(resolved: Resolved, perception: Perceives, *, pictures: Pa
     rig = resolved.rig
     if rig.bus is None:
         raise RobotConfigError(f"rig {rig.name}: expected the endpoint of its bus, came none")
+    if is_driven and rig.reset == "person":
+        return _driven_station(resolved, perception)
     session = open_session(rig.bus, is_hub=False)
     loop = ServoClient(resolved, when_closed=session.close)
     truth = RemoteTruth(session, rig.expected.serial)
@@ -68,7 +74,17 @@ def build_lab_station(resolved: Resolved, perception: Perceives, *, pictures: Pa
     world = _LabWorld(loop=loop, truth=truth, resetter=resetter)
     return LocalStation(
         world=world, loop=loop, perception=perception, arm=resolved.arm, scenario=resolved.scenario, rig=rig,
-        cell_shows=_pendant_of(rig),
+        hand=AskedHand(resolved.arm) if is_driven else None, cell_shows=_pendant_of(rig),
+    )  # fmt: skip
+
+
+def _driven_station(resolved: Resolved, perception: Perceives) -> LocalStation:
+    """Return the station of an arm that a person drives and whose table a person sees to."""
+    loop = ServoClient(resolved)
+    world = _LabWorld(loop=loop, truth=None, resetter=PersonLook(loop=loop, person=TerminalPerson()))
+    return LocalStation(
+        world=world, loop=loop, perception=perception, arm=resolved.arm, scenario=resolved.scenario, rig=resolved.rig,
+        hand=AskedHand(resolved.arm), cell_shows=_pendant_of(resolved.rig),
     )  # fmt: skip
 
 

@@ -28,7 +28,7 @@ from robot.messages import (
     Vec3,
     Verdict,
 )
-from robot.motion import HandReflexes
+from robot.motion import Hand, HandReflexes
 from robot.safety import Answer, Arming, Challenges, Lease, Reason, Tenure, draw_code
 from robot.tick_loop import Stride
 
@@ -131,6 +131,7 @@ class LocalStation:
         arm: ArmConfig,
         scenario: Scenario,
         rig: Rig,
+        hand: Hand | None = None,
         cell_shows: Callable[[str], None] | None = None,
         host_ns: Callable[[], int] = monotonic_ns,
     ) -> None:
@@ -143,12 +144,13 @@ class LocalStation:
             arm: the arm's file.
             scenario: the table.
             rig: what may be armed, and how often it may latch.
+            hand: decides what the fingers do; the reflexes where None.
             cell_shows: shows a text at the cell, as on the arm's pendant; None where only a console can.
             host_ns: this process's monotonic time, by which leases expire and answers are late.
         """
         table_m = scenario.table.height_m
         self._world, self._loop, self._perception, self._rig = world, loop, perception, rig
-        self._reflexes = HandReflexes(arm=arm, scenario=scenario)
+        self._reflexes: Hand = HandReflexes(arm=arm, scenario=scenario) if hand is None else hand
         self._arming = Arming(
             expected=rig.expected, max_latches=rig.max_latches, latch_window=rig.latch_window,
             challenges=Challenges(now_ns=host_ns, draw=draw_code),

@@ -14,7 +14,9 @@ from config.rig import Rig
 from config.scenario import Scenario
 from robot.errors import RobotConfigError
 from robot.hal.protocols import Plant
-from robot.local_station import LocalStation
+from robot.local_station import LocalStation, Perceives
+from robot.motion import AskedHand
+from robot.own_senses import OwnSenses
 from robot.safety import Operator
 from robot.tick_loop import TickLoop
 from robot.timed import time_world
@@ -61,6 +63,7 @@ def build_station(
     plant: Plant | None = None,
     heard_by: Callable[[str], None] | None = None,
     pictures: Path = Path("resets"),
+    is_driven: bool = False,
     cell_shows: Callable[[str], None] | None = None,
     host_ns: Callable[[], int] = monotonic_ns,
 ) -> LocalStation:
@@ -71,24 +74,33 @@ def build_station(
         plant: One that is already made, in place of the rig's.
         pictures: Folder for what a person who lays the table out needs to see.
         heard_by: A stopwatch's lap that hears of every tick, where the arm is held in this process.
+        is_driven: A person drives: the hand does what it is asked and nothing by itself, and a rig without a perception
+            is good enough.
         cell_shows: Shows a text at the cell of an arm that is held in this process; a rig with a bus has its own.
         host_ns: This process's monotonic time, for leases and answers at the cell; never for motion.
     """
     rig, arm, scenario = resolved.rig, resolved.arm, resolved.scenario
     check_usable(rig)
-    perception = _make(_require_perception(rig), "perception", scenario=scenario, arm=arm)
+    perception = _perception_of(resolved, is_driven=is_driven)
     if rig.bus is not None and plant is None:
         return load("robot.lab:build_lab_station")(
-            resolved, perception, pictures=pictures
+            resolved, perception, pictures=pictures, is_driven=is_driven
         )  # brings the bus, which lock-step never needs
     world = build_plant(rig=rig, arm=arm, scenario=scenario, cell=resolved.cell) if plant is None else plant
     if heard_by is not None:
         time_world(world, heard_by)
     loop = TickLoop(arm=world.arm, config=arm, scenario=scenario, rule_sets=resolved.rule_sets, rig=rig)
     return LocalStation(
-        world=world, loop=loop, perception=perception, arm=arm, scenario=scenario, rig=rig, cell_shows=cell_shows,
-        host_ns=host_ns,
+        world=world, loop=loop, perception=perception, arm=arm, scenario=scenario, rig=rig,
+        hand=AskedHand(arm) if is_driven else None, cell_shows=cell_shows, host_ns=host_ns,
     )  # fmt: skip
+
+
+def _perception_of(resolved: Resolved, *, is_driven: bool) -> Perceives:
+    if is_driven and resolved.rig.perception is None:
+        return OwnSenses()
+    rig = resolved.rig
+    return _make(_require_perception(rig), "perception", scenario=resolved.scenario, arm=resolved.arm)
 
 
 def check_usable(rig: Rig) -> None:

@@ -30,7 +30,8 @@ def world_of_numbers(world: TwinWorld, numbers: Sequence[float]) -> bool:
     for i, name in enumerate(names):
         at = N_ARM + i * N_THING
         x, y, z, qw, qx, qy, qz = numbers[at : at + N_THING]
-        things[name] = ((x, y, z), (qw, qx, qy, qz))
+        if any((qw, qx, qy, qz)):  # otherwise nobody has seen it yet
+            things[name] = ((x, y, z), (qw, qx, qy, qz))
     return pose_world(world, q_rad=(a, b, c, d, e, f), opening_m=opening_m, digital_out=int(outputs), things=things)
 
 
@@ -42,9 +43,15 @@ def pose_world(
     digital_out: int,
     things: dict[str, tuple[Vec3, Quat]],
 ) -> bool:
-    """Pose a world at rest; lids as the outputs have them. Returns whether a fixture was moved."""
+    """Pose a world at rest; lids as the outputs have them, things that are not named as they are.
+
+    Returns:
+        Whether a fixture was moved.
+    """
     model, data, is_moved = world.model, world.data, False
     for fixture in (*world.scenario.buttons, *world.scenario.boxes):
+        if fixture.name not in things:
+            continue
         place = model.body(on_table(fixture.name)).pos
         x, y, _ = things[fixture.name][0]
         if max(abs(place[0] - x), abs(place[1] - y)) > MOVED_M:
@@ -53,6 +60,8 @@ def pose_world(
     if is_moved:
         mujoco.mj_resetData(model, data)  # with sleeping on, what cannot move is placed by the reset alone
     for cylinder in world.scenario.cylinders:
+        if cylinder.name not in things:
+            continue
         address = int(model.joint(on_table(cylinder.name)).qposadr[0])
         position_m, quat = things[cylinder.name]
         data.qpos[address : address + N_THING] = (*position_m, *quat)

@@ -67,9 +67,8 @@ class TwinView:
     def show(self, measured: ArmState, percept: Percept) -> None:
         """Show this from now on."""
         numbers = posed_numbers(measured, percept)
-        if len(numbers) == self._n_numbers:  # a percept without things leaves them where they were drawn
-            self._numbers[: self._n_numbers] = numbers
-            self._numbers[self._n_numbers] += 1.0
+        self._numbers[: len(numbers)] = numbers  # without a percept of the table the arm alone is shown
+        self._numbers[self._n_numbers] += 1.0
 
     def close(self) -> None:
         """End it. Idempotent, never raises."""

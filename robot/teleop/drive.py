@@ -14,7 +14,7 @@ from robot.local_station import LocalStation
 from robot.messages import StationMode, StationState
 from robot.person import PersonOperator, TerminalPerson
 from robot.rigs import build_operator, build_shadow, build_station, build_view
-from robot.teleop.device import Device, open_device
+from robot.teleop.device import open_device
 from robot.teleop.driver import DriveEnd, Driver, DriveView, Pace, Unpaced
 from robot.teleop.interrupt import EndRequest
 from robot.teleop.jog import Jog, JogLimits
@@ -23,7 +23,7 @@ from robot.teleop.preview import AheadPreview
 from robot.teleop.readout import ReadOut
 from robot.teleop.view import View
 
-__all__ = ["DriveOptions", "run_drive"]
+__all__ = ["DriveOptions", "Rearm", "run_drive"]
 
 STEP_S = 0.02
 FULL_M_S, FULL_RAD_S = 0.25, 0.8
@@ -67,7 +67,7 @@ def run_drive(options: DriveOptions) -> None:
     console = Console(stderr=True)
     with ExitStack() as stack:
         end = stack.enter_context(EndRequest())
-        station = stack.enter_context(build_station(resolved))
+        station = stack.enter_context(build_station(resolved, is_driven=True))
         station.take_lease(f"teleop by {device.name}", life_ns=None if options.is_script else LEASE_NS)
         _arm(station, resolved, seed=options.seed)
         view = _open_view(resolved, console, stack) if options.view else None
@@ -79,7 +79,7 @@ def run_drive(options: DriveOptions) -> None:
             jog=Jog(_limits(resolved, options.speed)),
             pace=pace,
             step_s=STEP_S,
-            rearm=_Rearm(station, readout, device, seed=options.seed),
+            rearm=Rearm(station, readout, is_person=not options.is_script, seed=options.seed),
             tell=_Shown(readout, view, station),
             should_stop=end,
             preview=_open_preview(resolved, stack) if options.preview else None,
@@ -115,20 +115,23 @@ def _open_view(resolved: Resolved, console: Console, stack: ExitStack) -> View |
 
 
 def _open_preview(resolved: Resolved, stack: ExitStack) -> AheadPreview:
+    if resolved.rig.perception is None:
+        raise RobotConfigError(f"--preview: expected a rig that perceives its table, {resolved.rig.name} does not")
     shadow = build_shadow(resolved)
     stack.callback(shadow.close)
     return AheadPreview(shadow, n_ahead=round(AHEAD_S / STEP_S), step_s=STEP_S)
 
 
-class _Rearm:
+class Rearm:
     """Asks whoever sits at the terminal; each time it lays another table out, where a twin does that."""
 
-    def __init__(self, station: LocalStation, readout: ReadOut, device: Device, *, seed: int) -> None:
+    def __init__(self, station: LocalStation, readout: ReadOut, *, is_person: bool, seed: int) -> None:
         self._station, self._readout, self._seed = station, readout, seed
-        self._is_person = device.name != "script"
+        self._is_person = is_person
         self._n_resets = 0
 
     def __call__(self, state: StationState) -> bool:
+        """Return whether somebody armed it again. Raises SafetyError where the answer is wrong or late."""
         if not self._is_person:
             return False
         self._readout.pause()

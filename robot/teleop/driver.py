@@ -6,7 +6,7 @@ from typing import Protocol
 import msgspec
 
 from robot.errors import NotEngagedError, SafetyError
-from robot.messages import ArmState, Grip, Hold, Intent, Percept, StationMode, StationState, StepResult, Vec3, Verdict
+from robot.messages import ArmState, Hold, Intent, Percept, StationMode, StationState, StepResult, Vec3, Verdict
 from robot.station import Station
 from robot.teleop.device import Device, DriverInput
 from robot.teleop.jog import Jog
@@ -57,6 +57,8 @@ class DriveView(msgspec.Struct, frozen=True, kw_only=True):
 
     state: StationState
     asked: DriverInput
+    sent: Intent
+    """What was asked of the station."""
     resting: str
     """Why the arm rests; empty where it moves."""
     gain: float
@@ -168,7 +170,7 @@ class Driver:
 
     def _take_over(self) -> None:
         """Begin at rest where the arm is, with the hand as it is."""
-        self._jog.reset(_grip_now(self._station.measured))
+        self._jog.reset()
 
     def _is_driving(self, asked: DriverInput) -> bool:
         """Carry out one step; after a latch ask a person. False where the drive is over."""
@@ -181,7 +183,7 @@ class Driver:
         if self._preview is not None:
             intent, refused = self._preview.offer(intent, measured, self._station.percept)
         result = self._step(intent)
-        self._show(asked, now_ns, result, refused)
+        self._show(asked, intent, now_ns, result, refused)
         return True
 
     def _step(self, intent: Intent) -> StepResult | None:
@@ -221,11 +223,14 @@ class Driver:
             self._pace.wait_step()
         return False
 
-    def _show(self, asked: DriverInput, now_ns: int, result: StepResult | None, refused: Verdict | None) -> None:
+    def _show(
+        self, asked: DriverInput, sent: Intent, now_ns: int, result: StepResult | None, refused: Verdict | None
+    ) -> None:
         self._tell(
             DriveView(
                 state=self._station.state,
                 asked=asked,
+                sent=sent,
                 resting=self._jog.resting,
                 gain=self._jog.gain,
                 age_s=(now_ns - asked.stamp_ns) / 1e9,
@@ -236,8 +241,3 @@ class Driver:
                 n_steps=self._n_steps,
             )
         )
-
-
-def _grip_now(state: ArmState) -> Grip:
-    """Return what goes on with the hand as it is: what it holds it holds on to, otherwise it is open."""
-    return Grip.CLOSE if state.grip.has_object else Grip.OPEN

@@ -39,16 +39,12 @@ class Jog:
     def __init__(self, limits: JogLimits) -> None:
         self._limits = limits
         self._deadline_ns = round(limits.deadline_s * 1e9)
-        self.reset(None)
+        self.reset()
 
-    def reset(self, grip: Grip | None) -> None:
-        """Begin anew at rest: after arming, or a hand-over.
-
-        Args:
-            grip: what the hand does now and goes on doing until the driver asks for something; None leaves it.
-        """
+    def reset(self) -> None:
+        """Begin anew at rest, the hand as it is: after arming, or a hand-over."""
         self._gain = 0.0
-        self._grip = grip
+        self._grip: Grip | None = None
         self._frame: Frame | None = None
         self.resting: Resting = "released"
 

@@ -10,11 +10,11 @@ from rich.live import Live
 from rich.table import Table
 from rich.text import Text
 
-from robot.messages import ArmState, StationMode, Twist, Vec3
+from robot.messages import ArmState, Intent, StationMode, Twist, Vec3
 from robot.teleop.driver import DriveView
 from robot.teleop.meanings import meaning
 
-__all__ = ["ReadOut", "picture"]
+__all__ = ["ReadOut", "kept_share", "picture"]
 
 SHOWN_HZ = 10
 MM = 1e3
@@ -128,12 +128,16 @@ def _limits(view: DriveView) -> Text:
         return Text("none", style="dim")
     names = view.result.executed.limiters
     amounts = {v.reason: v.amount for v in view.result.verdicts if v.amount}
+    kept = kept_share(view.sent, view.result.executed.moved_m, view.step_s)
+    share = "" if kept is None or view.gain < 1.0 else f"  (the tool goes at {kept:.0%} of what was asked)"
     told = [f"{name}{f' {amounts[name]:.3g}' if name in amounts else ''}: {meaning(name)}" for name in names]
-    return Text("; ".join(told), style="yellow")
+    return Text("; ".join(told) + share, style="yellow")
 
 
-def kept_share(asked: Twist, moved_m: Vec3, step_s: float) -> float | None:
+def kept_share(asked: Intent, moved_m: Vec3, step_s: float) -> float | None:
     """Return how much of the asked speed was carried out along its own direction; None where none was asked."""
+    if not isinstance(asked, Twist):
+        return None
     speed = math.hypot(*asked.linear_m_s)
     if speed <= 0.0:
         return None

@@ -79,10 +79,13 @@ def test_along_the_tools_axis_is_down_for_a_tool_that_points_down(jog):
 
 
 def test_the_hand_goes_on_with_what_it_was_asked_last(jog):
-    jog.reset(Grip.CLOSE)
+    assert jog.decide(AHEAD, now_ns=0, tcp_quat=DOWN).grip is None
+    assert jog.decide(changed(grip=Grip.CLOSE), now_ns=0, tcp_quat=DOWN).grip is Grip.CLOSE
     assert jog.decide(AHEAD, now_ns=0, tcp_quat=DOWN).grip is Grip.CLOSE
     assert jog.decide(changed(grip=Grip.OPEN, is_held=False), now_ns=0, tcp_quat=DOWN).grip is Grip.OPEN
     assert jog.decide(AHEAD, now_ns=0, tcp_quat=DOWN).grip is Grip.OPEN
+    jog.reset()
+    assert jog.decide(AHEAD, now_ns=0, tcp_quat=DOWN).grip is None
 
 
 SHARE = st.floats(-1e6, 1e6)
