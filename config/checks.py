@@ -13,7 +13,7 @@ from config.rules import RuleSet
 from config.scenario import Cylinder, Goal, GoalKind, Scenario
 from config.yaml_text import join
 
-__all__ = ["RESERVED_NAMES", "check_arm", "check_learning", "check_rig", "check_rules", "check_scenario"]
+__all__ = ["RESERVED_NAMES", "Checker", "check_arm", "check_learning", "check_rig", "check_rules", "check_scenario"]
 
 RESERVED_NAMES = ("table", "gripper", "hand", "tool", "world")
 """Names that mean something by themselves in distances, rules or the simulated world."""
@@ -22,7 +22,7 @@ CAP_M = 0.015
 """Height of a button's cap and of the ring that holds it."""
 
 
-class _Checker:
+class Checker:
     """Raises for the first thing that does not hold, naming file and place."""
 
     def __init__(self, file: str) -> None:
@@ -54,7 +54,7 @@ class _Checker:
 
 def check_arm(arm: ArmConfig, file: str) -> None:
     """Check ranges, tool and motion limits of an arm."""
-    checker = _Checker(file)
+    checker = Checker(file)
     checker.unique(((f"joints[{i}].name", joint.name) for i, joint in enumerate(arm.joints)), "a joint name")
     for i, (joint, home_rad) in enumerate(zip(arm.joints, arm.home_rad, strict=True)):
         low, high = joint.range_rad
@@ -67,7 +67,7 @@ def check_arm(arm: ArmConfig, file: str) -> None:
     _check_motion(arm, checker)
 
 
-def _check_tool(arm: ArmConfig, checker: _Checker) -> None:
+def _check_tool(arm: ArmConfig, checker: Checker) -> None:
     tool = arm.tool
     checker.ascending(tool.force_n, "tool.force_n")
     checker.ascending(tool.speed_m_s, "tool.speed_m_s")
@@ -91,7 +91,7 @@ def _check_tool(arm: ArmConfig, checker: _Checker) -> None:
     )
 
 
-def _check_motion(arm: ArmConfig, checker: _Checker) -> None:
+def _check_motion(arm: ArmConfig, checker: Checker) -> None:
     motion, low, high = arm.motion, *arm.motion.workspace_m
     for axis in range(3):
         checker.ascending((low[axis], high[axis]), f"motion.workspace_m[1][{axis}]")
@@ -134,12 +134,12 @@ def check_rig(rig: Rig, file: str) -> None:
     """Check that a rig's ticks are made of whole physics steps."""
     n_steps = rig.tick_s / rig.physics_s
     is_whole = n_steps >= 0.5 and abs(n_steps - round(n_steps)) < 1e-6
-    _Checker(file).need(is_whole, "physics_s", f"a whole part of tick_s = {rig.tick_s:g}", f"{rig.physics_s:g}")
+    Checker(file).need(is_whole, "physics_s", f"a whole part of tick_s = {rig.tick_s:g}", f"{rig.physics_s:g}")
 
 
 def check_cell(cell: CellConfig, file: str) -> None:
     """Check that every signal is wired once and no terminal twice, that pulses are whole, and that voltages differ."""
-    checker = _Checker(file)
+    checker = Checker(file)
     for key, wires in (("inputs", cell.inputs), ("outputs", cell.outputs)):
         checker.unique(((f"{key}[{i}].signal", str(wire.signal)) for i, wire in enumerate(wires)), "a signal")
     checker.unique(((f"inputs[{i}].pin", wire.pin) for i, wire in enumerate(cell.inputs)), "a terminal")
@@ -159,7 +159,7 @@ def check_cell(cell: CellConfig, file: str) -> None:
 
 def check_learning(learning: LearningConfig, file: str) -> None:
     """Check that a learner can move and can fill its batches."""
-    checker = _Checker(file)
+    checker = Checker(file)
     shares = learning.actions.distance_shares
     checker.need(max(shares) > 0.0, "actions.distance_shares", "at least one share above 0", "only 0")
     expert = learning.expert
@@ -173,7 +173,7 @@ def check_learning(learning: LearningConfig, file: str) -> None:
 
 def check_rules(rules: RuleSet, file: str) -> None:
     """Check a rule set by itself: one rule an output, each input once a rule and without contradiction."""
-    checker = _Checker(file)
+    checker = Checker(file)
     checker.unique(((f"rules[{i}].output", rule.output) for i, rule in enumerate(rules.rules)), "an output")
     for i, rule in enumerate(rules.rules):
         is_on_by_input: dict[str, bool] = {}
@@ -186,7 +186,7 @@ def check_rules(rules: RuleSet, file: str) -> None:
 
 def check_scenario(scenario: Scenario, file: str) -> None:
     """Check names, wiring, references, goals and schedule of a scenario. Its geometry is checked in config.placing."""
-    checker = _Checker(file)
+    checker = Checker(file)
     _check_names(scenario, checker)
     _check_wiring(scenario, checker)
     boxes = [box.name for box in scenario.boxes]
@@ -210,7 +210,7 @@ def check_scenario(scenario: Scenario, file: str) -> None:
         checker.need(starts[i] > starts[i - 1], f"schedule[{i}].from_epoch", expected, f"{starts[i]}")
 
 
-def _check_names(scenario: Scenario, checker: _Checker) -> None:
+def _check_names(scenario: Scenario, checker: Checker) -> None:
     groups = {"buttons": scenario.buttons, "boxes": scenario.boxes, "cylinders": scenario.cylinders}
     places = [(f"{group}[{i}].name", thing.name) for group, things in groups.items() for i, thing in enumerate(things)]
     checker.unique(places, "a name")
@@ -219,7 +219,7 @@ def _check_names(scenario: Scenario, checker: _Checker) -> None:
     checker.unique(((f"goals[{i}].name", goal.name) for i, goal in enumerate(scenario.goals)), "a goal's name")
 
 
-def _check_wiring(scenario: Scenario, checker: _Checker) -> None:
+def _check_wiring(scenario: Scenario, checker: Checker) -> None:
     buttons = list(enumerate(scenario.buttons))
     boxes = list(enumerate(scenario.boxes))
     inputs = [(f"buttons[{i}].input", button.input) for i, button in buttons]
@@ -230,7 +230,7 @@ def _check_wiring(scenario: Scenario, checker: _Checker) -> None:
     checker.unique(outputs, "a digital output")
 
 
-def _check_cylinder(cylinder: Cylinder, boxes: list[str], where: str, checker: _Checker) -> None:
+def _check_cylinder(cylinder: Cylinder, boxes: list[str], where: str, checker: Checker) -> None:
     if cylinder.inside is not None:
         checker.known(cylinder.inside, boxes, join(where, "inside"), "a box")
     if cylinder.receptacle is not None:
@@ -239,21 +239,21 @@ def _check_cylinder(cylinder: Cylinder, boxes: list[str], where: str, checker: _
         checker.need(elsewhere, join(where, "receptacle"), "another box than it starts in", cylinder.receptacle)
 
 
-def _check_distances(scenario: Scenario, checker: _Checker) -> None:
+def _check_distances(scenario: Scenario, checker: Checker) -> None:
     things = [thing.name for group in (scenario.buttons, scenario.boxes, scenario.cylinders) for thing in group]
     for i, name in enumerate(scenario.distances):
         checker.known(name, [*things, "table"], f"distances[{i}]", "an object or table")
     checker.unique(((f"distances[{i}]", name) for i, name in enumerate(scenario.distances)), "a distance")
 
 
-def _check_seen(scenario: Scenario, checker: _Checker) -> None:
+def _check_seen(scenario: Scenario, checker: Checker) -> None:
     named = dict.fromkeys(name for goal in scenario.goals for name in (goal.object, goal.box) if name is not None)
     missing = [name for name in named if name not in scenario.distances]
     expected = f"every object that a goal names, since the learner is blind to others: {', '.join(named)}"
     checker.need(not missing, "distances", expected, f"none to {', '.join(missing)}")
 
 
-def _check_goal(goal: Goal, scenario: Scenario, where: str, checker: _Checker) -> None:
+def _check_goal(goal: Goal, scenario: Scenario, where: str, checker: Checker) -> None:
     of_kind: dict[GoalKind, Callable[[], None]] = {
         GoalKind.PRESSED: lambda: checker.known(
             goal.object, (button.name for button in scenario.buttons), join(where, "object"), "a button"
@@ -266,12 +266,12 @@ def _check_goal(goal: Goal, scenario: Scenario, where: str, checker: _Checker) -
         checker.need(goal.box is None, join(where, "box"), f"no box for kind {goal.kind.value}", f"{goal.box}")
 
 
-def _check_goal_cylinder(goal: Goal, scenario: Scenario, where: str, checker: _Checker) -> None:
+def _check_goal_cylinder(goal: Goal, scenario: Scenario, where: str, checker: Checker) -> None:
     names = [cylinder.name for cylinder in scenario.cylinders if not cylinder.is_distractor]
     checker.known(goal.object, names, join(where, "object"), "a cylinder that is no distractor")
 
 
-def _check_goal_in_box(goal: Goal, scenario: Scenario, where: str, checker: _Checker) -> None:
+def _check_goal_in_box(goal: Goal, scenario: Scenario, where: str, checker: Checker) -> None:
     _check_goal_cylinder(goal, scenario, where, checker)
     checker.need(goal.box is not None, join(where, "box"), "a box, since the kind is in_box", "nothing")
     checker.known(goal.box or "", (box.name for box in scenario.boxes), join(where, "box"), "a box")

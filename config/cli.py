@@ -7,7 +7,7 @@ import typer
 
 from config.errors import ConfigError
 from config.kinds import Kind, check_file
-from config.loader import load_arm, load_cell, load_learning, load_rig, load_rules, load_wired, resolve
+from config.loader import load_arm, load_cell, load_learning, load_limits, load_rig, load_rules, load_wired, resolve
 from config.resolved import dump_resolved
 from config.sources import shipped_names
 
@@ -18,6 +18,7 @@ SHIPPED = {
     "arms": load_arm,
     "cells": load_cell,
     "learning": load_learning,
+    "limits": load_limits,
     "rigs": load_rig,
     "rules": load_rules,
     "scenarios": load_wired,

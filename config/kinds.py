@@ -8,7 +8,17 @@ from config.arm import ArmConfig
 from config.cell import CellConfig
 from config.errors import ConfigError
 from config.learning import LearningConfig
-from config.loader import load_arm, load_cell, load_learning, load_resolved, load_rig, load_rules, load_wired
+from config.limits import LimitsFile
+from config.loader import (
+    load_arm,
+    load_cell,
+    load_learning,
+    load_limits,
+    load_resolved,
+    load_rig,
+    load_rules,
+    load_wired,
+)
 from config.resolved import Resolved
 from config.rig import Rig
 from config.rules import RuleSet
@@ -26,6 +36,7 @@ class Kind(StrEnum):
     ARM = "arm"
     CELL = "cell"
     LEARNING = "learning"
+    LIMITS = "limits"
     RESOLVED = "resolved"
     RIG = "rig"
     RULES = "rules"
@@ -37,6 +48,7 @@ STRUCTS: dict[Kind, type[Section]] = {
     Kind.ARM: ArmConfig,
     Kind.CELL: CellConfig,
     Kind.LEARNING: LearningConfig,
+    Kind.LIMITS: LimitsFile,
     Kind.RESOLVED: Resolved,
     Kind.RIG: Rig,
     Kind.RULES: RuleSet,
@@ -46,6 +58,7 @@ LOADERS: dict[Kind, Callable[[Path], object]] = {
     Kind.ARM: load_arm,
     Kind.CELL: load_cell,
     Kind.LEARNING: load_learning,
+    Kind.LIMITS: load_limits,
     Kind.RESOLVED: load_resolved,
     Kind.RIG: load_rig,
     Kind.RULES: load_rules,

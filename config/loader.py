@@ -11,20 +11,23 @@ from config.checks import check_arm, check_cell, check_learning, check_rig, chec
 from config.decode import decode
 from config.errors import ConfigError
 from config.learning import LearningConfig
+from config.limit_checks import check_limits, check_limits_fit, check_profile_named
+from config.limits import LimitsFile
 from config.placing import check_fit, check_placing
 from config.resolved import Resolved
-from config.rig import Rig
+from config.rig import DEFAULT_LIMITS, Rig
 from config.rules import RuleSet
 from config.scenario import Scenario
 from config.sources import Source, read_path, read_source
 from config.wiring import check_cell_fits, check_reachable, check_wiring
 from config.workspace import fenced
-from config.yaml_text import parse_yaml
+from config.yaml_text import Tree, parse_yaml
 
 __all__ = [
     "load_arm",
     "load_cell",
     "load_learning",
+    "load_limits",
     "load_resolved",
     "load_rig",
     "load_rules",
@@ -46,6 +49,7 @@ class _Files(msgspec.Struct, frozen=True, kw_only=True):
     scenario: str
     rule_sets: tuple[str, ...]
     learning: str
+    limits: str
     cell: str = "cell"
 
 
@@ -67,6 +71,11 @@ def load_rig(name: str | Path) -> Rig:
 def load_learning(name: str | Path) -> LearningConfig:
     """Return a learner's preset: `default`, `paper`, `group`, or a path."""
     return _load_learning(read_source("learning", name))
+
+
+def load_limits(name: str | Path, *, base: Path | None = None) -> LimitsFile:
+    """Return a limits file: `ur5e_parallel_jaw_85`, or a path, relative ones starting from base."""
+    return _load_limits(read_source("limits", name, base=base))
 
 
 def load_rules(name: str | Path, *, base: Path | None = None) -> RuleSet:
@@ -96,12 +105,14 @@ def resolve(*, rig: str | Path = "twin", scenario: str | Path = "paper", learnin
     arm_source = read_source("arms", loaded_rig.arm, base=rig_source.folder)
     loaded_scenario, rule_sets, scenario_file, rule_files = _load_wired(scenario)
     learning_source = read_source("learning", learning)
+    limits_source = _named_by(rig_source, "limits", "limits", loaded_rig.limits)
     resolved = Resolved(
         rig=loaded_rig,
         arm=fenced(_load_arm(arm_source), loaded_scenario, scenario_file),
         scenario=loaded_scenario,
         rule_sets=rule_sets,
         learning=_load_learning(learning_source),
+        limits=_load_limits(limits_source),
         cell=_cell_of(loaded_rig, rig_source),
     )
     files = _Files(
@@ -110,6 +121,7 @@ def resolve(*, rig: str | Path = "twin", scenario: str | Path = "paper", learnin
         scenario=scenario_file,
         rule_sets=rule_files,
         learning=learning_source.file,
+        limits=limits_source.file,
         cell=_cell_file(loaded_rig, rig_source),
     )
     _check_together(resolved, files)
@@ -127,7 +139,9 @@ def with_rig(resolved: Resolved, rig: str | Path) -> Resolved:
     arm = fenced(_load_arm(read_source("arms", loaded.arm, base=source.folder)), resolved.scenario, "scenario")
     if arm != resolved.arm:
         raise ConfigError(source.file, "arm", f"the arm that was used before, {resolved.arm.name}", repr(loaded.arm))
-    changed = msgspec.structs.replace(resolved, rig=loaded, cell=_cell_of(loaded, source))
+    limits_source = _named_by(source, "limits", "limits", loaded.limits)
+    limits = _load_limits(limits_source)
+    changed = msgspec.structs.replace(resolved, rig=loaded, limits=limits, cell=_cell_of(loaded, source))
     n = len(changed.rule_sets)
     names = _Files(
         rig=source.file,
@@ -135,6 +149,7 @@ def with_rig(resolved: Resolved, rig: str | Path) -> Resolved:
         scenario="scenario",
         rule_sets=("rules",) * n,
         learning="learning",
+        limits=limits_source.file,
         cell=_cell_file(loaded, source),
     )
     _check_together(changed, names)
@@ -144,7 +159,7 @@ def with_rig(resolved: Resolved, rig: str | Path) -> Resolved:
 def load_resolved(path: Path) -> Resolved:
     """Return what dump_resolved wrote, such as the config of a run folder, checked as if it came from its files."""
     source = read_path(path)
-    resolved = _decode(source, Resolved)
+    resolved = decode(_with_limits(parse_yaml(source.text, source.file)), Resolved, source.file)
     n_spans, n_sets = len(resolved.scenario.schedule), len(resolved.rule_sets)
     if n_spans != n_sets:
         raise ConfigError(source.file, "rule_sets", f"{n_spans}, one for each span of the schedule", f"{n_sets}")
@@ -154,6 +169,7 @@ def load_resolved(path: Path) -> Resolved:
         scenario=f"{source.file}: scenario",
         rule_sets=tuple(f"{source.file}: rule_sets[{i}]" for i in range(n_sets)),
         learning=f"{source.file}: learning",
+        limits=f"{source.file}: limits",
         cell=f"{source.file}: cell",
     )
     if resolved.cell is not None:
@@ -161,6 +177,7 @@ def load_resolved(path: Path) -> Resolved:
     check_rig(resolved.rig, files.rig)
     check_arm(resolved.arm, files.arm)
     check_learning(resolved.learning, files.learning)
+    check_limits(resolved.limits, files.limits)
     check_scenario(resolved.scenario, files.scenario)
     check_placing(resolved.scenario, files.scenario)
     _check_rule_sets(resolved.scenario, resolved.rule_sets, files.scenario, files.rule_sets)
@@ -183,19 +200,19 @@ def _load_cell(source: Source) -> CellConfig:
 
 def _cell_of(rig: Rig, source: Source) -> CellConfig | None:
     """Return the cell that a rig's file names, None where it names none."""
-    return None if rig.cell is None else _load_cell(_cell_source(rig.cell, source))
+    return None if rig.cell is None else _load_cell(_named_by(source, "cell", "cells", rig.cell))
 
 
 def _cell_file(rig: Rig, source: Source) -> str:
-    return "cell" if rig.cell is None else _cell_source(rig.cell, source).file
+    return "cell" if rig.cell is None else _named_by(source, "cell", "cells", rig.cell).file
 
 
-def _cell_source(name: str, rig: Source) -> Source:
-    """Return a rig's cell; a name that leads nowhere is an error of the rig's file."""
+def _named_by(rig: Source, key: str, folder: str, name: str) -> Source:
+    """Return what a rig's key names; a name that leads nowhere is an error of the rig's file."""
     try:
-        return read_source("cells", name, base=rig.folder)
+        return read_source(folder, name, base=rig.folder)
     except ConfigError as error:
-        raise ConfigError(rig.file, "cell", error.expected, f"{error.got} ({error.file})") from error
+        raise ConfigError(rig.file, key, error.expected, f"{error.got} ({error.file})") from error
 
 
 def _load_rig(source: Source) -> Rig:
@@ -208,6 +225,20 @@ def _load_learning(source: Source) -> LearningConfig:
     learning = _decode(source, LearningConfig)
     check_learning(learning, source.file)
     return learning
+
+
+def _load_limits(source: Source) -> LimitsFile:
+    limits = _decode(source, LimitsFile)
+    check_limits(limits, source.file)
+    return limits
+
+
+def _with_limits(tree: Tree) -> Tree:
+    """Return the tree of a Resolved with the limits of its rig's default, where it is from before there were any."""
+    rig = tree.get("rig") if isinstance(tree, dict) else None
+    if isinstance(tree, dict) and isinstance(rig, dict) and "limits" not in tree and "limits" not in rig:
+        return tree | {"limits": msgspec.to_builtins(load_limits(DEFAULT_LIMITS))}
+    return tree
 
 
 def _load_rules(source: Source) -> RuleSet:
@@ -262,6 +293,8 @@ def _check_together(resolved: Resolved, files: _Files) -> None:
         raise ConfigError(
             files.arm, "motion.step_s", f"whole ticks of the rig's {rig.tick_s:g} s", f"{arm.motion.step_s:g}"
         )
+    check_profile_named(resolved.limits, rig.profile, files.rig)
+    check_limits_fit(resolved.limits, arm, files.limits)
     check_fit(resolved.scenario, arm, files.scenario)
     if resolved.cell is not None:
         check_cell_fits(resolved.scenario, resolved.cell, files.cell)

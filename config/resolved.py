@@ -5,6 +5,7 @@ import msgspec
 from config.arm import ArmConfig
 from config.cell import CellConfig
 from config.learning import LearningConfig
+from config.limits import LimitsFile, Profile
 from config.rig import Rig
 from config.rules import RuleSet
 from config.scenario import Scenario
@@ -23,8 +24,16 @@ class Resolved(Section, frozen=True, kw_only=True):
     rule_sets: tuple[RuleSet, ...]
     """The i-th is in force from scenario.schedule[i].from_epoch."""
     learning: LearningConfig
+    limits: LimitsFile
     cell: CellConfig | None = None
     """How the rig's control box is wired; None is straight through."""
+
+    @property
+    def profile(self) -> Profile:
+        """The limits that the rig holds."""
+        found = self.limits.profile(self.rig.profile)
+        assert found is not None, "config.limit_checks saw to it"
+        return found
 
     def rules_at(self, epoch: int) -> RuleSet:
         """Return the rule set in force in an epoch."""

@@ -6,7 +6,9 @@ from msgspec import Meta
 
 from config.values import Name, Section
 
-__all__ = ["PlantExpected", "Rig"]
+__all__ = ["DEFAULT_LIMITS", "PlantExpected", "Rig"]
+
+DEFAULT_LIMITS = "ur5e_parallel_jaw_85"
 
 ImportString = Annotated[str, Meta(pattern=r"^[a-z_][a-z0-9_.]*:[A-Za-z_][A-Za-z0-9_]*\Z")]
 
@@ -26,6 +28,10 @@ class Rig(Section, frozen=True, kw_only=True):
     description: str = ""
     arm: str
     """A shipped arm's name or a path to a file."""
+    limits: str = DEFAULT_LIMITS
+    """A shipped limits file's name or a path to one; it must be for this arm and its tool."""
+    profile: Name = "unattended"
+    """Which of its profiles is held."""
     plant: ImportString
     perception: ImportString | None = None
     """What makes percepts; without one nothing can be learnt here, and the arm is not connected to."""

@@ -15,7 +15,7 @@ from config.sources import shipped_names
 
 ROOT = Path(__file__).parents[1]
 ROOMS = ("config", "learning", "perception", "robot", "sim_twin")
-FOLDERS = ("arms", "cells", "learning", "rigs", "rules", "scenarios")
+FOLDERS = ("arms", "cells", "learning", "limits", "rigs", "rules", "scenarios")
 
 
 def run(*command, cwd, **environment):

@@ -13,6 +13,7 @@ FOLDERS = {
     Kind.ARM: "arms",
     Kind.CELL: "cells",
     Kind.LEARNING: "learning",
+    Kind.LIMITS: "limits",
     Kind.RIG: "rigs",
     Kind.RULES: "rules",
     Kind.SCENARIO: "scenarios",
