@@ -174,6 +174,11 @@ class LocalStation:
         return self._world.identity
 
     @property
+    def loop(self) -> Loop:
+        """Who holds the arm, for whoever checks it past the station's door."""
+        return self._loop
+
+    @property
     def model_sha256(self) -> str | None:
         """Digest of the world's model, where it is a simulated one in this process."""
         return getattr(self._world, "model_sha256", None)

@@ -1,0 +1,3 @@
+"""check"""
+__all__=["check_twin"]
+def check_twin(): ...
