@@ -1,5 +1,6 @@
 """What touched what, how hard and how fast, against the pairs that a profile allows."""
 
+import itertools
 from collections.abc import Iterator
 
 from config.limits import AllowedContact, Profile, Touched
@@ -38,9 +39,7 @@ def contact_readings(course: Course, profile: Profile) -> Iterator[Reading]:
         worst, pair = max(touches, key=lambda entry: entry[0].force_n)
         share = 1.0 - worst.force_n / pair.force_n
         at_s = worst.step * course.physics_s
-        yield Reading(
-            limit=f"force:{name}", share=share, value=worst.force_n, at_s=at_s, detail=worst.other_name
-        )
+        yield Reading(limit=f"force:{name}", share=share, value=worst.force_n, at_s=at_s, detail=worst.other_name)
         yield _meeting(course, name, [t for t, _ in touches], pair)
     yield from _whole(course, profile)
 
@@ -83,10 +82,8 @@ def _whole(course: Course, profile: Profile) -> Iterator[Reading]:
         by_tick[touch.step // course.n_substeps] += touch.force_n / course.n_substeps
     force, tick_s = profile.contact_force, course.physics_s * course.n_substeps
     blow = max(range(n_ticks), key=by_tick.__getitem__)
-    yield Reading(
-        limit="blow", share=1.0 - by_tick[blow] / force.blow_n, value=by_tick[blow], at_s=blow * tick_s
-    )
-    lasting = [min(pair) for pair in zip(by_tick, by_tick[1:], strict=False)] or [0.0]
+    yield Reading(limit="blow", share=1.0 - by_tick[blow] / force.blow_n, value=by_tick[blow], at_s=blow * tick_s)
+    lasting = [min(pair) for pair in itertools.pairwise(by_tick)] or [0.0]
     steady = max(range(len(lasting)), key=lasting.__getitem__)
     yield Reading(
         limit="steady_force", share=1.0 - lasting[steady] / force.steady_n, value=lasting[steady], at_s=steady * tick_s

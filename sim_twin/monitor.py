@@ -20,8 +20,9 @@ from sim_twin.allowances import Allowances
 from sim_twin.clearance import FARTHEST_M, Clearances, Nearest, own_pairs, scene_pairs
 from sim_twin.contacts import allowed_pairs, contact_readings
 from sim_twin.plant import TwinWorld
-from sim_twin.readings import Reading
+from sim_twin.readings import Margin, Reading
 from sim_twin.recorder import Course, PartKind
+from sim_twin.scales import keep_out_scale_m, plane_scale_m
 
 __all__ = ["Monitor"]
 
@@ -30,7 +31,8 @@ _POINT = {ArmPart.TCP: 0, ArmPart.FLANGE: 1, ArmPart.ELBOW: 2}
 CALM_S = 0.15
 """So long after a contact the joints' acceleration is still the contact's doing: the servo swings it off."""
 REST_M_S = 0.001
-LEAST_SCALE_M = 0.1
+HARD_N = 60.0
+"""A hand that holds something light presses on it with less."""
 
 
 class Monitor:
@@ -50,58 +52,84 @@ class Monitor:
             for reading in self._readings(course)
         )
 
-    def _readings(self, course: Course) -> Iterator[Reading]:
+    def margins(self, course: Course) -> Iterator[Margin]:
+        """Return the margin of each limit that has one at every instant, as shares over the course."""
         yield from self._joints(course)
+        yield from self._set_points(course)
         yield from self._speeds(course)
         yield from self._space(course)
-        yield from contact_readings(course, self._profile)
         yield from self._grip(course)
+
+    def _readings(self, course: Course) -> Iterator[Reading]:
+        yield from (margin.worst(course.physics_s) for margin in self.margins(course))
+        yield from contact_readings(course, self._profile)
         yield from _stops(course, self._profile)
         clearances, dt = self._profile.clearances, course.physics_s * course.n_substeps
         yield self._clearance("self_clearance", self._own.nearest(course), clearances.self_m, dt)
         yield self._clearance("scene_clearance", self._scene.nearest(course), clearances.scene_m, dt)
 
-    def _joints(self, course: Course) -> Iterator[Reading]:
-        joints, dt = self._profile.joints, course.physics_s
+    def _joints(self, course: Course) -> Iterator[Margin]:
+        joints = self._profile.joints
         low, high = (np.array([j.range_rad[i] for j in joints]) for i in (0, 1))
         half = (high - low) / 2.0
-        yield _worst("joint_range", 1.0 - np.abs(course.q_rad - (low + high) / 2.0) / half, course.q_rad, dt)
+        yield Margin("joint_range", 1.0 - np.abs(course.q_rad - (low + high) / 2.0) / half, course.q_rad)
         speed = np.abs(course.qd_rad_s)
-        yield _worst("joint_speed", 1.0 - speed / [j.speed_rad_s for j in joints], speed, dt)
+        yield Margin("joint_speed", 1.0 - speed / [j.speed_rad_s for j in joints], speed)
         rate = _accelerations(course)
         if len(rate):
-            yield _worst("joint_acceleration", 1.0 - rate / [j.acceleration_rad_s2 for j in joints], rate, dt)
+            yield Margin("joint_acceleration", 1.0 - rate / [j.acceleration_rad_s2 for j in joints], rate)
 
-    def _speeds(self, course: Course) -> Iterator[Reading]:
+    def _set_points(self, course: Course) -> Iterator[Margin]:
+        """Read what reached the drives: its differences over ticks, exact where the joints themselves lag and swing.
+
+        While the plant stops by itself, is laid out anew, or is in contact, where a set-point falls back to the arm,
+        differences say nothing of a limit.
+        """
+        joints, tick_s = self._profile.joints, course.physics_s * course.n_substeps
+        odd = _near(course, course.stopping | _pressed(course))[:: course.n_substeps][: len(course.set_point_rad)]
+        rate = course.set_point_rad
+        for name, most in (
+            ("command_speed", [j.speed_rad_s for j in joints]),
+            ("command_acceleration", [j.acceleration_rad_s2 for j in joints]),
+            ("command_jerk", [j.jerk_rad_s3 for j in joints]),
+        ):
+            if len(rate) < 2:
+                return
+            rate = np.diff(rate, axis=0) / tick_s
+            came = np.where(odd[len(odd) - len(rate) :, None], 0.0, np.abs(rate))
+            yield Margin(name, 1.0 - came / most, came)
+
+    def _speeds(self, course: Course) -> Iterator[Margin]:
         speeds = self._profile.speeds
         for i, (name, most) in enumerate(
             (("tcp", speeds.tcp_m_s), ("flange", speeds.flange_m_s), ("elbow", speeds.elbow_m_s))
         ):
             came = course.speed_m_s[:, i]
-            yield _worst(f"{name}_speed", 1.0 - came / most, came, course.physics_s)
+            yield Margin(f"{name}_speed", 1.0 - came / most, came)
 
-    def _space(self, course: Course) -> Iterator[Reading]:
-        space, dt = self._profile.workspace, course.physics_s
+    def _space(self, course: Course) -> Iterator[Margin]:
+        space = self._profile.workspace
         for box in space.boxes:
             middle, half = _middle(box.low_m, box.high_m), _half(box.low_m, box.high_m)
             inside = np.stack([1.0 - np.abs(_at(course, p) - middle) / half for p in box.parts], axis=1)
-            yield _worst(f"box:{box.name}", inside, inside, dt)
+            yield Margin(f"box:{box.name}", inside, inside)
         for plane in space.planes:
             height = np.stack([_over(plane, _at(course, p)) for p in plane.parts], axis=1)
-            yield _worst(f"plane:{plane.name}", height / plane_scale_m(plane), height, dt)
+            yield Margin(f"plane:{plane.name}", height / plane_scale_m(plane), height)
         for keep in space.keep_outs:
             away = np.stack([_outside(keep, _at(course, p)) for p in keep.parts], axis=1)
-            yield _worst(f"keep_out:{keep.name}", away / keep_out_scale_m(keep), away, dt)
+            yield Margin(f"keep_out:{keep.name}", away / keep_out_scale_m(keep), away)
         tilt = np.arccos(np.clip(-course.approach[:, 2], -1.0, 1.0))
-        yield _worst("tool_cone", 1.0 - tilt / space.tool_cone_rad, tilt, dt)
+        yield Margin("tool_cone", 1.0 - tilt / space.tool_cone_rad, tilt)
 
-    def _grip(self, course: Course) -> Iterator[Reading]:
-        grip, dt = self._profile.grip, course.physics_s
-        yield _worst("grip_force", 1.0 - course.grip_force_n / grip.force_n[1], course.grip_force_n, dt)
-        yield _worst("grip_speed", 1.0 - course.grip_speed_m_s / grip.speed_m_s[1], course.grip_speed_m_s, dt)
+    def _grip(self, course: Course) -> Iterator[Margin]:
+        grip = self._profile.grip
+        yield Margin("grip_force", 1.0 - course.grip_force_n / grip.force_n[1], course.grip_force_n)
+        speed = np.where(_near(course, _held(course)), 0.0, course.grip_speed_m_s)
+        yield Margin("grip_speed", 1.0 - speed / grip.speed_m_s[1], speed)
         low, high = grip.opening_m
         half = (high - low) / 2.0
-        yield _worst("grip_opening", 1.0 - np.abs(course.opening_m - (low + high) / 2.0) / half, course.opening_m, dt)
+        yield Margin("grip_opening", 1.0 - np.abs(course.opening_m - (low + high) / 2.0) / half, course.opening_m)
 
     def _clearance(self, name: str, near: Nearest, least_m: float, tick_s: float) -> Reading:
         if least_m <= 0.0:
@@ -112,30 +140,6 @@ class Monitor:
         return Reading(
             limit=name, share=share, value=near.distance_m, at_s=near.tick * tick_s, detail=" to ".join(parts)
         )
-
-
-def plane_scale_m(plane: Plane) -> float:
-    """Return what a plane's margin is a share of: how far the plane is from the base."""
-    return max(abs(float(np.dot(plane.point_m, plane.normal))) / float(np.linalg.norm(plane.normal)), LEAST_SCALE_M)
-
-
-def keep_out_scale_m(keep: KeepOut) -> float:
-    """Return what a keep-out's margin is a share of: half its least width."""
-    return float(_half(keep.low_m, keep.high_m).min()) + keep.radius_m
-
-
-def _worst(limit: str, share: Array, value: Array, dt_s: float) -> Reading:
-    """Return the least share over a course, the value there and when that was.  (n,) or (n, k)"""
-    k = int(np.argmin(share))
-    columns = int(np.prod(share.shape[1:])) if share.ndim > 1 else 1
-    where = f"#{k % columns + 1}" if columns > 1 else ""
-    return Reading(
-        limit=limit,
-        share=float(share.flat[k]),
-        value=float(value.flat[k]),
-        at_s=k // columns * dt_s,
-        detail=where,
-    )
 
 
 def _at(course: Course, part: ArmPart) -> Array:
@@ -176,17 +180,27 @@ def _accelerations(course: Course) -> Array:
     if course.n_steps <= n:
         return np.empty((0, 6))
     rate = np.abs(course.qd_rad_s[n:] - course.qd_rad_s[:-n]) / (n * course.physics_s)
-    disturbed = course.stopping.copy()
+    return np.where(_near(course, course.stopping | _pressed(course))[n:, None], 0.0, rate)
+
+
+def _pressed(course: Course) -> NDArray[np.bool_]:
+    """Return when the arm touched anything but what it holds lightly.  () -> (n,)"""
+    pressed = np.zeros(course.n_steps, dtype=bool)
+    pressed[[t.step for t in course.touches if t.other is not PartKind.OBJECT or t.force_n > HARD_N]] = True
+    return pressed
+
+
+def _held(course: Course) -> NDArray[np.bool_]:
+    """Return when the fingers touched anything: what they hold moves them, and they snap shut when they lose it."""
     touching = np.zeros(course.n_steps, dtype=bool)
-    touching[[t.step for t in course.touches if t.other is not PartKind.OBJECT or t.force_n > HARD_N]] = True
-    disturbed |= touching
-    calm = round(CALM_S / course.physics_s) + n
-    spread = np.convolve(disturbed, np.ones(calm), mode="full")[: course.n_steps] > 0.0
-    return np.where(spread[n:, None], 0.0, rate)
+    touching[[t.step for t in course.touches if t.own is PartKind.FINGERS]] = True
+    return touching
 
 
-HARD_N = 60.0
-"""A hand that holds something light presses on it with less."""
+def _near(course: Course, when: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Return whether something was so at a step or a short while before it.  (n,) -> (n,)"""
+    calm = round(CALM_S / course.physics_s) + course.n_substeps
+    return np.convolve(when, np.ones(calm), mode="full")[: course.n_steps] > 0.0
 
 
 def _stops(course: Course, profile: Profile) -> Iterator[Reading]:

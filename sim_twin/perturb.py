@@ -19,7 +19,7 @@ class Perturbation(msgspec.Struct, frozen=True, kw_only=True):
     braking_factor: float = 1.0
     """Times the deceleration of the arm's own stop."""
     payload_kg: float = 0.0
-    """Mass in the hand that the arm's weight compensation knows nothing of; negative: it counts on one that is absent."""
+    """Mass in the hand that weight compensation knows nothing of; negative: it counts on one that is absent."""
     kinematics_m: float = 0.0
     """Added to the length of both arm links and of the tool."""
 

@@ -59,6 +59,8 @@ class Course(msgspec.Struct, frozen=True, kw_only=True):
     """(n, 6)"""
     qd_rad_s: Array
     """(n, 6)"""
+    set_point_rad: Array
+    """(ticks, 6) what reached the joints' drives"""
     opening_m: Array
     """(n,) distance between the pads"""
     grip_force_n: Array
@@ -113,6 +115,7 @@ class Recorder:
         self._world, model = world, world.model
         n = most_ticks * world.n_substeps
         self._q, self._qd = np.empty((n, N_JOINTS)), np.empty((n, N_JOINTS))
+        self._set_points = np.empty((most_ticks, N_JOINTS))
         self._fingers = np.empty((n, 2))
         self._finger_speeds = np.empty((n, 2))
         self._grip = np.empty(n)
@@ -172,6 +175,7 @@ class Recorder:
             if data.ncon:
                 self._note_touches(model, data)
             self._n += 1
+        self._set_points[self._n_ticks] = data.ctrl[self._world.joint_controls]
         self._placed[self._n_ticks] = data.geom_xpos
         self._turned[self._n_ticks] = data.geom_xmat
         self._n_ticks += 1

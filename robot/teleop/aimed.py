@@ -57,7 +57,7 @@ def at_the_things(look: Look, arena: Arena, rng: Rng) -> Iterator[Ask]:
         grip = [None, Grip.OPEN, Grip.CLOSE][int(rng.integers(3))]
         yield from _towards(look, over, arena, rng, n=120, grip=grip)
         yield from _towards(look, np.array([x, y, z - 0.1]), arena, rng, n=int(rng.integers(40, 120)), grip=grip)
-        yield from _towards(look, over + [0, 0, 0.1], arena, rng, n=25, grip=grip)
+        yield from _towards(look, over + np.array([0.0, 0.0, 0.1]), arena, rng, n=25, grip=grip)
 
 
 def at_the_joints(look: Look, arena: Arena, rng: Rng) -> Iterator[Ask]:
@@ -73,6 +73,7 @@ def at_the_joints(look: Look, arena: Arena, rng: Rng) -> Iterator[Ask]:
 
 def fast_joints(look: Look, arena: Arena, rng: Rng) -> Iterator[Ask]:
     """One joint or a few to and fro as fast as they are let."""
+    del arena
     while True:
         start = np.array(look().q_rad)
         swing = np.where(rng.random(6) < 0.4, rng.choice([-1.0, 1.0], size=6), 0.0) * rng.uniform(0.1, 3.0)

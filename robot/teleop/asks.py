@@ -1,4 +1,4 @@
-"""What a stream may ask of a station at one instant, what it sees, and what it is told of the place it is let loose in."""
+"""What a stream may ask of a station at one instant, what it sees, and what it is told of the place."""
 
 from collections.abc import Callable, Iterator
 

@@ -68,9 +68,7 @@ class Battery:
     def place(self, number: int) -> Place:
         """Return family and plant of a stream that stands alone."""
         names = self._names
-        return Place(
-            number=number, family=names[number % len(names)], plant=number // len(names) % self._n_plants
-        )
+        return Place(number=number, family=names[number % len(names)], plant=number // len(names) % self._n_plants)
 
     def searches(self) -> tuple[Search, ...]:
         """Return the blocks of streams that search."""

@@ -1,4 +1,4 @@
-"""Streams that no person would send on purpose. Pure: chance comes in as a generator, the arm's state through `look`."""
+"""Streams that no person would send on purpose. Pure: chance is a generator, the arm's state comes by `look`."""
 
 import math
 from collections.abc import Iterator
@@ -53,8 +53,7 @@ def chirps(look: Look, arena: Arena, rng: Rng) -> Iterator[Ask]:
 def not_finite(look: Look, arena: Arena, rng: Rng) -> Iterator[Ask]:
     """Good intents, and in between one with a number in it that is none."""
     while True:
-        for ask in _some(random_walk(look, arena, rng), int(rng.integers(1, 50))):
-            yield ask
+        yield from _some(random_walk(look, arena, rng), int(rng.integers(1, 50)))
         yield Send(_spoilt(rng, look().q_rad))
 
 
@@ -77,8 +76,7 @@ def _spoilt(rng: Rng, q_rad: Vec6) -> Intent:
 def malformed(look: Look, arena: Arena, rng: Rng) -> Iterator[Ask]:
     """Good intents, and in between one of the wrong length, the wrong type or out of all reason."""
     while True:
-        for ask in _some(random_headings(look, arena, rng), int(rng.integers(1, 50))):
-            yield ask
+        yield from _some(random_headings(look, arena, rng), int(rng.integers(1, 50)))
         kind = int(rng.integers(5))
         if kind == 0:
             yield Send(_NOT_INTENTS[int(rng.integers(len(_NOT_INTENTS)))])

@@ -75,7 +75,9 @@ def _reach(look: Look, goal: np.ndarray, arena: Arena, rng: Rng) -> Iterator[Ask
     n = math.ceil(duration / arena.tick_s)
     for k in range(n):
         speed = minimum_jerk((k + 0.5) / n) / duration
-        yield Send(Twist(linear_m_s=_vec3(path * speed + across * math.cos(phase + 2.0 * math.pi * rate * k * arena.tick_s))))
+        yield Send(
+            Twist(linear_m_s=_vec3(path * speed + across * math.cos(phase + 2.0 * math.pi * rate * k * arena.tick_s)))
+        )
 
 
 def _vec3(x: np.ndarray) -> Vec3:

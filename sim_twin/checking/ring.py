@@ -12,10 +12,10 @@ from robot.rigs import build_operator, build_station
 from robot.safety import Operator
 from robot.teleop import Arena, Ask, Look, Seen, Send, Silence, Write
 from robot.tick_loop import TickLoop
-from sim_twin.allowances import Allowances
+from sim_twin.allowances import allowances_for
 from sim_twin.monitor import Monitor
 from sim_twin.perturb import Perturbation, perturbed_plant
-from sim_twin.readings import Reading
+from sim_twin.readings import Margin, Reading
 from sim_twin.recorder import Course, Recorder
 
 __all__ = ["Ring", "StreamResult", "arena_of"]
@@ -84,7 +84,6 @@ class Ring:
         resolved: rig, arm, scenario and the limits that the stack holds.
         perturbation: how the plant differs from its file.
         profile: the limits that the monitor holds: the stack's own, or the true ones where those were weakened.
-        allowances: what of a reading is the plant's doing.
         n_commands: how many commands a stream has.
     """
 
@@ -93,7 +92,6 @@ class Ring:
         resolved: Resolved,
         perturbation: Perturbation,
         profile: Profile,
-        allowances: Allowances,
         *,
         n_commands: int,
     ) -> None:
@@ -111,7 +109,7 @@ class Ring:
         world = self._plant.world
         self._most_ticks = MOST_TICKS_PER_COMMAND * n_commands + 200
         self._recorder = Recorder(world, most_ticks=self._most_ticks + 200)
-        self._monitor = Monitor(world, profile, allowances)
+        self._monitor = Monitor(world, profile, allowances_for(profile, perturbation))
         self.arena = arena_of(resolved, profile)
         self._n_latches = 0
         self._since_latch: int | None = None
@@ -133,9 +131,7 @@ class Ring:
             is_latched=self._since_latch is not None,
         )
 
-    def run(
-        self, make: Callable[[Look, Arena], Iterator[Ask]], *, number: int, family: str, seed: int
-    ) -> StreamResult:
+    def run(self, make: Callable[[Look, Arena], Iterator[Ask]], *, number: int, family: str, seed: int) -> StreamResult:
         """Lay a table out, let a stream loose on it, and judge what the physics did."""
         self._reset(seed)
         self._recorder.clear()
@@ -156,6 +152,10 @@ class Ring:
             readings=self._monitor.judge(self.course),
             rest_ms=_rest_ms(self.course, self._silences),
         )
+
+    def margins(self) -> Iterator[Margin]:
+        """Return the margins over the newest stream's course, limit by limit."""
+        return iter(()) if self.course is None else self._monitor.margins(self.course)
 
     def _reset(self, seed: int) -> None:
         station, operator = self._station, self._operator
