@@ -63,5 +63,6 @@ def allowances_for(profile: Profile, by: Perturbation) -> Allowances:
     shares["joint_range"] = ROUNDING + droop
     shares["tool_cone"] = (BOW_M + 3.0 * droop) / space.tool_cone_rad
     low, high = profile.grip.opening_m
+    shares["grip_speed"] = OVERSHOOT
     shares["grip_opening"] = END_STOP_M / ((high - low) / 2.0)
     return Allowances(by_limit=shares)

@@ -31,6 +31,7 @@ _POINT = {ArmPart.TCP: 0, ArmPart.FLANGE: 1, ArmPart.ELBOW: 2}
 CALM_S = 0.15
 """So long after a contact the joints' acceleration is still the contact's doing: the servo swings it off."""
 REST_M_S = 0.001
+RINGING_S = 0.1
 HARD_N = 60.0
 """A hand that holds something light presses on it with less."""
 
@@ -125,8 +126,9 @@ class Monitor:
     def _grip(self, course: Course) -> Iterator[Margin]:
         grip = self._profile.grip
         yield Margin("grip_force", 1.0 - course.grip_force_n / grip.force_n[1], course.grip_force_n)
-        speed = np.where(_near(course, _held(course)), 0.0, course.grip_speed_m_s)
-        yield Margin("grip_speed", 1.0 - speed / grip.speed_m_s[1], speed)
+        speed = _finger_speeds(course)
+        if len(speed):
+            yield Margin("grip_speed", 1.0 - speed / grip.speed_m_s[1], speed)
         low, high = grip.opening_m
         half = (high - low) / 2.0
         yield Margin("grip_opening", 1.0 - np.abs(course.opening_m - (low + high) / 2.0) / half, course.opening_m)
@@ -190,11 +192,19 @@ def _pressed(course: Course) -> NDArray[np.bool_]:
     return pressed
 
 
-def _held(course: Course) -> NDArray[np.bool_]:
-    """Return when the fingers touched anything: what they hold moves them, and they snap shut when they lose it."""
+def _finger_speeds(course: Course) -> Array:
+    """Return how fast the opening changed, over spans in which the fingers' own ringing about their ramp cancels.
+
+    Fingers that touched something are moved by what they hold, and snap shut when they lose it: zero there.
+
+    Returns:
+        (n,)
+    """
+    n = round(RINGING_S / course.physics_s)
     touching = np.zeros(course.n_steps, dtype=bool)
     touching[[t.step for t in course.touches if t.own is PartKind.FINGERS]] = True
-    return touching
+    speed = np.abs(course.opening_m[n:] - course.opening_m[:-n]) / RINGING_S
+    return np.where(_near(course, touching)[n:], 0.0, speed)
 
 
 def _near(course: Course, when: NDArray[np.bool_]) -> NDArray[np.bool_]:

@@ -63,11 +63,11 @@ def perturbed_plant(resolved: Resolved, by: Perturbation) -> TwinPlant:
     world = plant.world
     world.stop_rad_s2 *= by.braking_factor
     if by.payload_kg:
-        _load(world.model, world.data, by.payload_kg)
+        _load(world.model, by.payload_kg)
     return plant
 
 
-def _load(model: mujoco.MjModel, data: mujoco.MjData, payload_kg: float) -> None:
+def _load(model: mujoco.MjModel, payload_kg: float) -> None:
     """Put a mass into the hand that is not compensated, or let one be compensated that is not there."""
     tool = model.body("tool").id
     mass = float(model.body_mass[tool])
@@ -77,4 +77,4 @@ def _load(model: mujoco.MjModel, data: mujoco.MjData, payload_kg: float) -> None
         model.body_gravcomp[tool] = mass / (mass + payload_kg)
     else:
         model.body_gravcomp[tool] = (mass - payload_kg) / mass
-    mujoco.mj_setConst(model, data)
+    mujoco.mj_setConst(model, mujoco.MjData(model))

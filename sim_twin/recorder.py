@@ -65,8 +65,6 @@ class Course(msgspec.Struct, frozen=True, kw_only=True):
     """(n,) distance between the pads"""
     grip_force_n: Array
     """(n,) what the hand's drive presses with"""
-    grip_speed_m_s: Array
-    """(n,) how fast the opening changes"""
     position_m: Array
     """(n, 3, 3) of tcp, flange and elbow, base frame"""
     speed_m_s: Array
@@ -117,7 +115,6 @@ class Recorder:
         self._q, self._qd = np.empty((n, N_JOINTS)), np.empty((n, N_JOINTS))
         self._set_points = np.empty((most_ticks, N_JOINTS))
         self._fingers = np.empty((n, 2))
-        self._finger_speeds = np.empty((n, 2))
         self._grip = np.empty(n)
         self._points, self._approach = np.empty((n, 3, 3)), np.empty((n, 3))
         self._twists, self._centre = np.empty((n, 2, 6)), np.empty((n, 3))
@@ -137,8 +134,6 @@ class Recorder:
         model, data = world.model, world.data
         left, right = world.finger_addresses
         self._finger_at = slice(left, right + 1)
-        speeds = [int(model.joint(f"finger_{s}").dofadr[0]) for s in ("left", "right")]
-        self._finger_speed_at = slice(speeds[0], speeds[1] + 1)
         self._tcp, self._flange = (data.site_xpos[model.site(s).id] for s in ("tcp", "flange"))
         self._elbow = data.xpos[model.body("link_3").id]
         self._tool_frame = data.site_xmat[model.site("tcp").id].reshape(3, 3)
@@ -161,8 +156,9 @@ class Recorder:
         points = self._points[:n]
         return Course(
             physics_s=float(self._world.model.opt.timestep), n_substeps=self._world.n_substeps,
-            q_rad=self._q[:n], qd_rad_s=self._qd[:n], opening_m=self._fingers[:n].sum(axis=1),
-            grip_force_n=np.abs(self._grip[:n]), grip_speed_m_s=np.abs(self._finger_speeds[:n].sum(axis=1)),
+            q_rad=self._q[:n], qd_rad_s=self._qd[:n], set_point_rad=self._set_points[:ticks],
+            opening_m=self._fingers[:n].sum(axis=1),
+            grip_force_n=np.abs(self._grip[:n]),
             position_m=points, speed_m_s=_speeds(points, self._twists[:n], self._centre[:n]),
             approach=self._approach[:n], placed_m=self._placed[:ticks], turned=self._turned[:ticks],
             touches=tuple(self._touches), stopping=self._stopping[:n],
@@ -183,7 +179,7 @@ class Recorder:
     def _copy(self, data: mujoco.MjData) -> None:
         k = self._n
         self._q[k], self._qd[k] = data.qpos[:N_JOINTS], data.qvel[:N_JOINTS]
-        self._fingers[k], self._finger_speeds[k] = data.qpos[self._finger_at], data.qvel[self._finger_speed_at]
+        self._fingers[k] = data.qpos[self._finger_at]
         self._grip[k] = data.actuator_force[self._world.grip_control]
         self._points[k, 0], self._points[k, 1], self._points[k, 2] = self._tcp, self._flange, self._elbow
         self._approach[k] = self._tool_frame[:, 2]

@@ -1,7 +1,7 @@
-"""A search for the stream that comes nearest to a limit: the cross-entropy method over a few knots of intents.
+"""A search for the stream that comes nearest to a limit: hill climbing from the best of a few random beginnings.
 
-R. Y. Rubinstein, "The cross-entropy method for combinatorial and continuous optimization" (1999): draw candidates from
-a normal distribution, keep the best, fit the distribution to them, again.
+A block has room for a few dozen streams, too few to fit a distribution to a hundred numbers: what is nearest so far is
+kept, and a few of its knots are drawn anew or nudged.
 """
 
 from collections.abc import Iterator
@@ -15,32 +15,36 @@ __all__ = ["Candidates", "played"]
 
 N_KNOTS, N_VALUES = 8, 14
 """A knot: whether joints or a velocity, six of either, the hand."""
-N_GENERATIONS, N_DRAWN, N_BEST = 4, 8, 3
-LEAST_SPREAD = 0.15
+N_BLOCK, N_RANDOM = 32, 8
+KNOTS_CHANGED = 0.3
+NUDGE = 0.4
 JOINT_SPAN_RAD = 2.0
 
 
 class Candidates:
     """Proposes knots and learns from what came of them; the lower a score, the nearer to the limit."""
 
-    BLOCK = N_GENERATIONS * N_DRAWN
+    BLOCK = N_BLOCK
 
     def __init__(self, rng: np.random.Generator) -> None:
         self._rng = rng
-        self._mean, self._spread = np.zeros((N_KNOTS, N_VALUES)), np.ones((N_KNOTS, N_VALUES))
-        self._came: list[tuple[float, np.ndarray]] = []
+        self._n = 0
+        self._best: tuple[float, np.ndarray] | None = None
 
     def propose(self) -> np.ndarray:
         """Return a candidate.  () -> (knots, values)"""
-        return self._mean + self._spread * self._rng.normal(size=self._mean.shape)
+        rng, fresh = self._rng, self._rng.normal(size=(N_KNOTS, N_VALUES))
+        self._n += 1
+        if self._n <= N_RANDOM or self._best is None:
+            return fresh
+        best = self._best[1]
+        changed = rng.random((N_KNOTS, 1)) < KNOTS_CHANGED
+        return np.where(changed, np.where(rng.random() < 0.5, fresh, best + NUDGE * fresh), best)
 
     def learn(self, knots: np.ndarray, score: float) -> None:
-        """Take note of a score; after a whole generation the next is drawn nearer to the best."""
-        self._came.append((score, knots))
-        if len(self._came) == N_DRAWN:
-            best = np.stack([k for _, k in sorted(self._came, key=lambda pair: pair[0])[:N_BEST]])
-            self._mean, self._spread = best.mean(axis=0), np.maximum(best.std(axis=0), LEAST_SPREAD)
-            self._came = []
+        """Take note of a score."""
+        if self._best is None or score < self._best[0]:
+            self._best = (score, knots)
 
 
 def played(knots: np.ndarray, look: Look, arena: Arena) -> Iterator[Ask]:
