@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+from config.limited import limited
 from config.resolved import Resolved
 from robot.bus import open_session
 from robot.bus.twin_link import RemoteResetter, RemoteTruth
@@ -45,7 +46,7 @@ def build_lab_station(resolved: Resolved, perception: Perceives, *, pictures: Pa
         RobotConfigError: the rig names no bus.
         BusError: nobody listens at its endpoint.
     """
-    rig = resolved.rig
+    rig, arm = resolved.rig, limited(resolved.arm, resolved.profile)
     if rig.bus is None:
         raise RobotConfigError(f"rig {rig.name}: expected the endpoint of its bus, came none")
     session = open_session(rig.bus, is_hub=False)
@@ -57,12 +58,10 @@ def build_lab_station(resolved: Resolved, perception: Perceives, *, pictures: Pa
         )
         world = _LabWorld(loop=loop, truth=truth, resetter=by_person)
         station = PersonResetStation(
-            world=world, loop=loop, perception=perception, arm=resolved.arm, scenario=resolved.scenario, rig=rig
+            world=world, loop=loop, perception=perception, arm=arm, scenario=resolved.scenario, rig=rig
         )
         station.prepare(by_person, resolved.arm.home_rad)
         return station
     resetter = RemoteResetter(session, rig.expected.serial, loop=loop, truth=truth)
     world = _LabWorld(loop=loop, truth=truth, resetter=resetter)
-    return LocalStation(
-        world=world, loop=loop, perception=perception, arm=resolved.arm, scenario=resolved.scenario, rig=rig
-    )
+    return LocalStation(world=world, loop=loop, perception=perception, arm=arm, scenario=resolved.scenario, rig=rig)

@@ -287,6 +287,7 @@ class LocalStation:
                 moved_m=(x1 - x0, y1 - y0, z1 - z0),
                 target_m=stride.target_m,
                 limiters=(*stride.limiters, "object_lost") if is_lost else stride.limiters,
+                limited=stride.limited,
             ),
             verdicts=verdicts,
             is_void=is_lost or bool(verdicts),

@@ -5,14 +5,17 @@ from collections.abc import Callable
 import msgspec
 
 from config.arm import ArmConfig
+from config.limited import limited
+from config.limits import Profile
 from config.rig import Rig
 from config.rules import RuleSet
 from config.scenario import Scenario
 from robot.cell import Cell
+from robot.envelope import Envelope
 from robot.errors import ArmRefusedError, RobotConfigError, StaleStateError, WireError
 from robot.hal.protocols import Arm
 from robot.kinematics import ToolChain
-from robot.messages import ArmCommand, ArmState, GripCommand, Intent, Vec3, Verdict
+from robot.messages import ArmCommand, ArmState, GripCommand, Intent, Limited, Vec3, Verdict
 from robot.motion import Mover
 from robot.safety import Gate, GateLimits, Reason
 
@@ -33,6 +36,8 @@ class Stride(msgspec.Struct, frozen=True, kw_only=True):
     """Where the tool centre point will rest if nothing more is asked."""
     limiters: tuple[str, ...]
     is_in_contact: bool
+    limited: tuple[Limited, ...] = ()
+    """The limiters, each with by how much."""
     verdict: Verdict | None = None
     """The gate's refusal, if it refused."""
 
@@ -52,6 +57,7 @@ class TickLoop:
         scenario: Scenario,
         rule_sets: tuple[RuleSet, ...],
         rig: Rig,
+        profile: Profile,
         when_latched: Callable[[Verdict], object] | None = None,
     ) -> None:
         """Put the parts together; the arm is not connected to.
@@ -59,6 +65,7 @@ class TickLoop:
         Args:
             arm: what is driven.
             config: the arm's file.
+            profile: what of it may be used.
             scenario: the table.
             rule_sets: one for each span of the scenario's schedule.
             rig: how long a tick is.
@@ -71,10 +78,12 @@ class TickLoop:
             raise RobotConfigError(f"rig {rig.name}: tick {rig.tick_s} s, the plant's is {1 / arm.spec.rate_hz} s")
         table_m = scenario.table.height_m
         self._arm = arm
+        config = limited(config, profile)
+        envelope = Envelope.of(profile, config, tick_s=rig.tick_s)
         self._cell = Cell(scenario=scenario, rule_sets=rule_sets, arm=config)
-        self._mover = Mover(config, table_m=table_m, tick_s=rig.tick_s)
+        self._mover = Mover(config, envelope=envelope, table_m=table_m, tick_s=rig.tick_s)
         limits = GateLimits.of(config, arm.spec, table_m=table_m, tick_s=rig.tick_s)
-        self._gate = Gate(arm=arm, limits=limits, chain=ToolChain(config), when_latched=when_latched)
+        self._gate = Gate(arm=arm, limits=limits, envelope=envelope, chain=ToolChain(config), when_latched=when_latched)
         self._tick_s, self._tick_ns = rig.tick_s, round(rig.tick_s * 1e9)
         self.state: ArmState
         self._read_ns = self._epoch = 0
@@ -205,7 +214,7 @@ class TickLoop:
         mover, before, self._before = self._mover, self._before, self.state
         return Stride(
             before=before, after=self.state, is_begun=is_begun, target_m=mover.target_m, limiters=mover.limiters,
-            is_in_contact=mover.is_in_contact, verdict=verdict,
+            limited=mover.limited, is_in_contact=mover.is_in_contact, verdict=verdict,
         )  # fmt: skip
 
 
