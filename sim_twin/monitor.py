@@ -20,6 +20,7 @@ from sim_twin.allowances import Allowances
 from sim_twin.clearance import FARTHEST_M, Clearances, Nearest, own_pairs, scene_pairs
 from sim_twin.contacts import allowed_pairs, contact_readings
 from sim_twin.plant import TwinWorld
+from sim_twin.points import Points
 from sim_twin.readings import Margin, Reading
 from sim_twin.recorder import Course, PartKind
 from sim_twin.scales import keep_out_scale_m, plane_scale_m
@@ -41,6 +42,7 @@ class Monitor:
 
     def __init__(self, world: TwinWorld, profile: Profile, allowances: Allowances) -> None:
         self._profile, self._allow, self._world = profile, allowances, world
+        self._pointed = Points(world)
         self._own = Clearances(world, own_pairs(world))
         self._scene = Clearances(world, scene_pairs(world, allowed_pairs(profile)))
 
@@ -49,7 +51,7 @@ class Monitor:
         if course.n_steps == 0:
             return ()
         return tuple(
-            msgspec.structs.replace(reading, is_broken=reading.share < -self._allow.of(reading.limit))
+            msgspec.structs.replace(reading, is_broken=bool(reading.share < -self._allow.of(reading.limit)))
             for reading in self._readings(course)
         )
 
@@ -99,12 +101,13 @@ class Monitor:
             rate = np.diff(rate, axis=0) / tick_s
             came = np.where(odd[len(odd) - len(rate) :, None], 0.0, np.abs(rate))
             yield Margin(name, 1.0 - came / most, came)
+        moved = self._pointed.speeds(course.set_point_rad, tick_s)
+        moved = np.where(odd[len(odd) - len(moved) :, None], 0.0, moved)
+        for i, (name, most) in enumerate(_point_speeds(self._profile)):
+            yield Margin(f"command_{name}_speed", 1.0 - moved[:, i] / most, moved[:, i])
 
     def _speeds(self, course: Course) -> Iterator[Margin]:
-        speeds = self._profile.speeds
-        for i, (name, most) in enumerate(
-            (("tcp", speeds.tcp_m_s), ("flange", speeds.flange_m_s), ("elbow", speeds.elbow_m_s))
-        ):
+        for i, (name, most) in enumerate(_point_speeds(self._profile)):
             came = course.speed_m_s[:, i]
             yield Margin(f"{name}_speed", 1.0 - came / most, came)
 
@@ -146,6 +149,11 @@ class Monitor:
 
 def _at(course: Course, part: ArmPart) -> Array:
     return course.position_m[:, _POINT[part]]
+
+
+def _point_speeds(profile: Profile) -> tuple[tuple[str, float], ...]:
+    speeds = profile.speeds
+    return ("tcp", speeds.tcp_m_s), ("flange", speeds.flange_m_s), ("elbow", speeds.elbow_m_s)
 
 
 def _middle(low: tuple[float, ...], high: tuple[float, ...]) -> Array:
@@ -203,6 +211,7 @@ def _finger_speeds(course: Course) -> Array:
     n = round(RINGING_S / course.physics_s)
     touching = np.zeros(course.n_steps, dtype=bool)
     touching[[t.step for t in course.touches if t.own is PartKind.FINGERS]] = True
+    touching |= course.stopping  # and a table that is laid out anew after a stop opens the hand at once
     speed = np.abs(course.opening_m[n:] - course.opening_m[:-n]) / RINGING_S
     return np.where(_near(course, touching)[n:], 0.0, speed)
 

@@ -173,7 +173,7 @@ def gate_at_places(look: Look, arena: Arena, rng: Rng) -> Iterator[Ask]:
         q = np.array(look().q_rad)
         way = rng.normal(size=6) * np.where(rng.random(6) < 0.5, 1.0, 0.0)
         way /= max(1e-9, float(np.abs(way / np.array(arena.qd_max_rad_s)).max()))
-        speed, rise, most = 0.0, float(rng.uniform(0.01, 0.08)), float(rng.uniform(0.05, 1.02))
+        speed, rise, most = 0.0, float(rng.uniform(0.01, 0.08)), float(rng.choice([0.3, 0.7, 0.999, 1.045]))
         for _ in range(int(rng.integers(20, 200))):
             speed = min(most, speed + rise)
             q = q + way * speed * arena.tick_s
@@ -200,7 +200,8 @@ def gate_grips(look: Look, arena: Arena, rng: Rng) -> Iterator[Ask]:
         if rng.random() < 0.7:
             yield from _towards(look, np.array([x, y, z]), arena, rng, n=180, grip=Grip.OPEN)
         q = look().q_rad
-        excess = rng.choice([0.98, 1.0, 1.02, 1.04, 1.2], size=3)
+        excess = np.full(3, 1.0)
+        excess[int(rng.integers(3))] = rng.choice([1.0, 1.03, 1.045, 1.3])
         for k in range(60):
             hand = most[k // 30 % 2]
             yield Write(

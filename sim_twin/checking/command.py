@@ -9,10 +9,11 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from config.resolved import Resolved
-from robot.bench import bench_report
+from robot.bench import BenchResult, bench_report
 from robot.teleop.wanted import Answer, Wanted
 from sim_twin.checking.check import N_COMMANDS, Setup, check_streams, part_of, rerun
-from sim_twin.checking.report import CheckReport, as_json, draw, shown
+from sim_twin.checking.mutations import MUTATIONS, try_mutation
+from sim_twin.checking.report import CheckReport, MutationReport, as_json, draw, shown, shown_mutations
 from sim_twin.checking.ring import StreamResult
 from sim_twin.checking.tally import Tally
 
@@ -26,6 +27,8 @@ def check_rig(resolved: Resolved, wanted: Wanted) -> Answer:
         resolved=resolved, profile=profile, seed=wanted.seed,
         n_commands=wanted.n_commands or N_COMMANDS,
     )  # fmt: skip
+    if wanted.mutate:
+        return _mutate(resolved, wanted)
     begin = perf_counter()
     tally = _one(setup, wanted.stream) if wanted.stream is not None else _many(setup, wanted)
     report = _report(setup, tally, wanted, seconds=perf_counter() - begin)
@@ -72,3 +75,27 @@ def _keep(setup: Setup, report: CheckReport, folder: Path) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "check.json").write_text(as_json(report) + "\n", encoding="utf-8")
     draw(setup, report, folder / "margins.png")
+
+
+def _mutate(resolved: Resolved, wanted: Wanted) -> Answer:
+    """Weaken each limit alone and see that the battery tells."""
+    begin = perf_counter()
+    n_commands = wanted.n_commands or N_COMMANDS
+    with Progress(console=Console(stderr=True), transient=True) as progress:
+        outcomes = tuple(
+            try_mutation(resolved, mutation, seed=wanted.seed, n_commands=n_commands)
+            for mutation in progress.track(MUTATIONS, description="limits weakened")
+        )
+    n_caught = sum(outcome.is_caught for outcome in outcomes)
+    rows = (
+        BenchResult(name="limits_weakened", value=len(outcomes), unit="1"),
+        BenchResult(name="caught", value=n_caught, unit="1", goal=f"{len(outcomes)}", ok=n_caught == len(outcomes)),
+    )
+    bench = bench_report("safety_mutations", rows, seconds=perf_counter() - begin)
+    report = MutationReport(
+        **msgspec.structs.asdict(bench), rig=resolved.rig.name, profile=resolved.profile.name, seed=wanted.seed,
+        outcomes=outcomes,
+    )  # fmt: skip
+    return Answer(
+        json=msgspec.json.encode(report).decode(), shown=shown_mutations(report), is_passed=n_caught == len(outcomes)
+    )

@@ -10,9 +10,10 @@ from rich.table import Table
 
 from robot.bench import BenchReport
 from sim_twin.checking.check import Setup, rerun
+from sim_twin.checking.mutations import Outcome
 from sim_twin.checking.tally import Breach, LimitRow
 
-__all__ = ["CheckReport", "as_json", "draw", "shown"]
+__all__ = ["CheckReport", "MutationReport", "as_json", "draw", "shown", "shown_mutations"]
 
 N_DRAWN = 4
 
@@ -32,6 +33,30 @@ class CheckReport(BenchReport, frozen=True, kw_only=True):
     def is_passed(self) -> bool:
         """Whether no limit was broken."""
         return all(result.ok for result in self.results)
+
+
+class MutationReport(BenchReport, frozen=True, kw_only=True):
+    """What weakening each limit alone by 5 % came to."""
+
+    rig: str
+    profile: str
+    seed: int
+    outcomes: tuple[Outcome, ...]
+
+
+def shown_mutations(report: MutationReport) -> tuple[RenderableType, ...]:
+    """Return a table of one row a limit."""
+    table = Table(
+        "limit", "margin", "margin, 5 % weaker", "held", "told", "by",
+        title=f"each limit weakened alone: rig {report.rig}, profile {report.profile}, seed {report.seed}",
+    )  # fmt: skip
+    for row in report.outcomes:
+        by = f"{row.family} {row.number}" if row.is_caught else ""
+        table.add_row(
+            row.limit, f"{row.true_margin_share:+.1%}", f"{row.weakened_margin_share:+.1%}",
+            "yes" if row.is_held else "NO", "yes" if row.is_caught else "NO", by,
+        )  # fmt: skip
+    return (table,)
 
 
 def shown(report: CheckReport) -> tuple[RenderableType, ...]:
