@@ -7,11 +7,13 @@ from config.checks import Checker
 from config.limited import FENCE_MARGIN_M
 from config.limits import ATTENDED, ATTENDED_SPEED_M_S, ArmPart, Fence, KeepOut, LimitsFile, Plane, Profile
 from config.posture import part_points, tilt_rad
+from config.scenario import Scenario
 from config.values import Point
 from config.yaml_text import join
 
 __all__ = ["check_limits", "check_limits_fit", "check_profile_named"]
 
+ROUNDING_M = 1e-9
 TAKEN = "reduced"
 """A name of UR's own, for a mode of the controller's safety system."""
 
@@ -29,12 +31,13 @@ def check_profile_named(limits: LimitsFile, name: str, rig_file: str) -> None:
     Checker(rig_file).known(name, (profile.name for profile in limits.profiles), "profile", f"one of {limits.name}'s")
 
 
-def check_limits_fit(limits: LimitsFile, arm: ArmConfig, file: str) -> None:
+def check_limits_fit(limits: LimitsFile, arm: ArmConfig, scenario: Scenario, file: str) -> None:
     """Check that a limits file is for this arm and its tool, and that each profile leaves the arm a home and room.
 
     Args:
         limits: the file.
         arm: the arm, its workspace cut to the scenario's.
+        scenario: the table.
         file: what errors call the limits file.
     """
     checker = Checker(file)
@@ -44,7 +47,7 @@ def check_limits_fit(limits: LimitsFile, arm: ArmConfig, file: str) -> None:
     for i, profile in enumerate(limits.profiles):
         where = f"profiles[{i}]"
         _check_home(profile, arm, where, checker)
-        _check_room(profile, arm, where, checker)
+        _check_room(profile, arm, scenario, where, checker)
         _check_grip(profile, arm, where, checker)
         _check_stopping(profile, arm, where, checker)
 
@@ -70,17 +73,27 @@ def _check_home(profile: Profile, arm: ArmConfig, where: str, checker: Checker) 
     checker.need(space.tool_cone_rad > tilt, f"{at}.tool_cone_rad", expected, f"{space.tool_cone_rad:g}")
 
 
-def _check_room(profile: Profile, arm: ArmConfig, where: str, checker: Checker) -> None:
-    """Check that boxes leave the tool all of the workspace that the arm's file and the scenario give it."""
+def _check_room(profile: Profile, arm: ArmConfig, scenario: Scenario, where: str, checker: Checker) -> None:
+    """Check that boxes leave the tool all of a workspace that the scenario names, and its heights over the table."""
+    lowest, travel = (scenario.table.height_m + height for height in arm.motion.heights_m)
+    low, high = list(arm.motion.workspace_m[0]), list(arm.motion.workspace_m[1])
+    what = "the scenario's workspace_m"
+    if scenario.workspace_m is None:
+        what = "the home and the heights that the tool comes to"
+        home = part_points(arm, arm.home_rad)[ArmPart.TCP]
+        low, high = [home[0], home[1], lowest], [home[0], home[1], travel]
     for i, box in enumerate(profile.workspace.boxes):
         if ArmPart.TCP not in box.parts:
             continue
-        for axis, (low, high) in enumerate(zip(*arm.motion.workspace_m, strict=True)):
-            at, m = f"{where}.workspace.boxes[{i}]", FENCE_MARGIN_M
-            least, most = f"at most {low - m:g}", f"at least {high + m:g}"
-            why = ", so that the workspace of arm and scenario is inside, or narrow that one (workspace_m)"
-            checker.need(box.low_m[axis] <= low - m, f"{at}.low_m[{axis}]", least + why, f"{box.low_m[axis]:g}")
-            checker.need(box.high_m[axis] >= high + m, f"{at}.high_m[{axis}]", most + why, f"{box.high_m[axis]:g}")
+        at, m = f"{where}.workspace.boxes[{i}]", FENCE_MARGIN_M
+        for axis in range(3):
+            least, most = f"at most {low[axis] - m:g}, for {what}", f"at least {high[axis] + m:g}, for {what}"
+            is_low, is_high = (
+                box.low_m[axis] <= low[axis] - m + ROUNDING_M,
+                box.high_m[axis] >= high[axis] + m - ROUNDING_M,
+            )
+            checker.need(is_low, f"{at}.low_m[{axis}]", least, f"{box.low_m[axis]:g}")
+            checker.need(is_high, f"{at}.high_m[{axis}]", most, f"{box.high_m[axis]:g}")
 
 
 def _check_grip(profile: Profile, arm: ArmConfig, where: str, checker: Checker) -> None:

@@ -17,7 +17,7 @@ from robot.hal.protocols import Arm
 from robot.kinematics import ToolChain
 from robot.messages import ArmCommand, ArmState, GripCommand, Intent, Limited, Vec3, Verdict
 from robot.motion import Mover
-from robot.safety import Gate, GateLimits, Reason
+from robot.safety import Gate, GateLimits, Reason, check_profile_fits
 
 __all__ = ["Stride", "TickLoop"]
 
@@ -72,12 +72,13 @@ class TickLoop:
             when_latched: told of a refusal before the arm is stopped for it.
 
         Raises:
-            RobotConfigError: the arm's tick is another.
+            RobotConfigError: the arm's tick is another, or the profile allows more than the arm can do.
         """
         if abs(arm.spec.rate_hz * rig.tick_s - 1.0) > WHOLE_TICKS:
             raise RobotConfigError(f"rig {rig.name}: tick {rig.tick_s} s, the plant's is {1 / arm.spec.rate_hz} s")
         table_m = scenario.table.height_m
         self._arm = arm
+        check_profile_fits(profile, arm.spec)
         config = limited(config, profile)
         envelope = Envelope.of(profile, config, tick_s=rig.tick_s)
         self._cell = Cell(scenario=scenario, rule_sets=rule_sets, arm=config)

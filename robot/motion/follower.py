@@ -45,6 +45,7 @@ class Follower:
     def __init__(self, arm: ArmConfig, *, envelope: Envelope, tick_s: float) -> None:
         motion, joints = arm.motion, arm.joints
         self._envelope = envelope
+        self._fence_names = {fence.name for fence in envelope.fences}
         self._is_swift = tick_s < SWIFT_TICK_S
         self._kinematics = Kinematics(arm, is_swift=self._is_swift)
         self._home_yaw_rad = arm.tool_yaw_rad
@@ -73,6 +74,7 @@ class Follower:
         self.q_rad = self.q_before_rad = q_rad
         self.trouble: str | None = None
         self.held: tuple[str, float] | None = None
+        self._is_fenced = False
         self._points = self._kinematics.chain.points(q_rad)
         self.target_m = self._kinematics.tcp(q_rad)
         self.yaw_rad = self._home_yaw_rad
@@ -133,6 +135,13 @@ class Follower:
         except UnreachableError:
             return None
 
+    def let_go(self) -> None:
+        """Where a fence holds the tool up, want no more than where it is: no way back begins behind the fence."""
+        if self._is_fenced and self._is_upright:
+            x, y, z, _ = self._tool.at
+            self.target_m = x, y, z
+        self._is_fenced = False
+
     def brake(self) -> None:
         """Come to rest as soon as the limits allow."""
         if self._is_upright:
@@ -185,6 +194,7 @@ class Follower:
         if not name:
             return now
         self.held = name, math.dist((sx, sy, sz), (x, y, z)) / math.dist((x, y, z), before[:3])
+        self._is_fenced = True
         dt, target, speed = self._tick_s, self._tool.target, self._tool.speed
         speed = [speed[0] + (sx - x) / dt, speed[1] + (sy - y) / dt, speed[2] + (sz - z) / dt, speed[3]]
         self._tool.seed([sx, sy, sz, yaw], speed)
@@ -204,6 +214,7 @@ class Follower:
             self._points = points
             return q
         self.held = name, 1.0 - share
+        self._is_fenced = self._is_fenced or name in self._fence_names
         q = _between(now, q, share)
         self._points = chain.points(q)
         if self._is_upright:

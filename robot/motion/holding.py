@@ -13,6 +13,8 @@ __all__ = ["MARGIN_M", "RESERVE", "Points", "share_of_giving_way", "share_of_ste
 
 MARGIN_M = 5e-4
 """Motion stops this far inside of a fence, so that the gate never meets one by rounding or by a path that bows."""
+SLIDE_MARGIN_M = 1e-3
+"""The tool slides along a fence at this distance, so that inverse kinematics' last digits never bring it to a stop."""
 MARGIN_RAD = 1e-3
 RESERVE = 0.95
 """Share of a limit that motion uses, so that the gate's own is never met by rounding."""
@@ -133,7 +135,7 @@ def slid(now_m: Vec3, to_m: Vec3, envelope: Envelope) -> tuple[Vec3, str]:
         if fence.part or fence.gap(to_m) > envelope.fence_far_m:
             continue
         gap, left = fence.gap(now_m), fence.gap(to_m)
-        over = gap - left - braking_step(gap - MARGIN_M, envelope.fence_braking_m)
+        over = gap - left - braking_step(gap - SLIDE_MARGIN_M, envelope.fence_braking_m)
         if over > 0.0 and left < gap:
             nx, ny, nz = fence.away(now_m)
             to_m = (to_m[0] + over * nx, to_m[1] + over * ny, to_m[2] + over * nz)

@@ -78,6 +78,7 @@ class Mover:
     def begin_step(self, intent: Intent, state: ArmState, *, duration_s: float) -> None:
         """Move the target as an intent asks for one time step. The gate has admitted the intent."""
         self._amounts = {}
+        self._follower.let_go()
         at, yaw = self._follower.target_m, self._follower.yaw_rad
         if isinstance(intent, Heading):
             self._follow(advance_heading(at, intent, self._limits, duration_s), yaw, state)

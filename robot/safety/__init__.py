@@ -3,6 +3,16 @@
 from robot.safety.arming import Armable, Arming, Operator, TooManyLatchesError
 from robot.safety.checks import Reason, Refusal
 from robot.safety.gate import Gate
-from robot.safety.limits import GateLimits
+from robot.safety.limits import GateLimits, check_profile_fits
 
-__all__ = ["Armable", "Arming", "Gate", "GateLimits", "Operator", "Reason", "Refusal", "TooManyLatchesError"]
+__all__ = [
+    "Armable",
+    "Arming",
+    "Gate",
+    "GateLimits",
+    "Operator",
+    "Reason",
+    "Refusal",
+    "TooManyLatchesError",
+    "check_profile_fits",
+]

@@ -16,7 +16,9 @@ __all__ = [
 ]
 
 ROUNDING = 1e-9
-"""Share of a step by which rounding may pass a limit; of a way, in metres or radians, where the limit is 0."""
+"""Share of a step by which rounding may pass a limit."""
+CREEP_RAD = 1e-6
+"""A joint may come to its end by steps as small as this, from which it need not brake."""
 PART_NAMES = ("tool centre point", "flange", "elbow")
 
 Points = tuple[Vec3, Vec3, Vec3]
@@ -35,7 +37,7 @@ def check_soft_margin(q_rad: Vec6, last_rad: Vec6, envelope: Envelope) -> Refusa
         else:
             continue
         most = end.step_rad * (SLOWEST_SHARE + (1.0 - SLOWEST_SHARE) * gap / end.margin_rad)
-        stops = step * step <= 2.0 * end.braking_rad * gap + ROUNDING * ROUNDING
+        stops = step <= CREEP_RAD or step * step <= 2.0 * end.braking_rad * gap
         if not (stops and step <= most * (1.0 + ROUNDING)):
             detail = (
                 f"joint {i + 1}: expected at most {most:g} rad a tick towards an end {gap:g} rad away, came {step:g}"
