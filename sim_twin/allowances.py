@@ -30,7 +30,8 @@ RAMP = 0.02
 """Of the fingers' speed over a tenth of a second."""
 GIVE_RAD = 0.003
 """A joint that brakes at its end swings past by so much."""
-BOW_M = 0.001
+BOW_M = 0.002
+"""The tool brakes at 3 m/s² on a servo of 38 rad/s and up: it swings past by at most 3 / 38² m."""
 END_STOP_M = 0.002
 N_LENGTHENED = 3
 DROOP_M_PER_KG = 0.0025

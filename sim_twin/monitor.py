@@ -31,7 +31,8 @@ Array = NDArray[np.float64]
 _POINT = {ArmPart.TCP: 0, ArmPart.FLANGE: 1, ArmPart.ELBOW: 2}
 CALM_S = 0.15
 """So long after a contact the joints' acceleration is still the contact's doing: the servo swings it off."""
-REST_M_S = 0.001
+REST_M_S = 0.005
+"""Fingers that were stopped while they pressed creep over what they stand on at a few millimetres a second."""
 RINGING_S = 0.1
 HARD_N = 60.0
 """A hand that holds something light presses on it with less."""
@@ -64,7 +65,7 @@ class Monitor:
         yield from self._grip(course)
 
     def _readings(self, course: Course) -> Iterator[Reading]:
-        yield from (margin.worst(course.physics_s) for margin in self.margins(course))
+        yield from (margin.worst() for margin in self.margins(course))
         yield from contact_readings(course, self._profile)
         yield from _stops(course, self._profile)
         clearances, dt = self._profile.clearances, course.physics_s * course.n_substeps
@@ -75,12 +76,16 @@ class Monitor:
         joints = self._profile.joints
         low, high = (np.array([j.range_rad[i] for j in joints]) for i in (0, 1))
         half = (high - low) / 2.0
-        yield Margin("joint_range", 1.0 - np.abs(course.q_rad - (low + high) / 2.0) / half, course.q_rad)
+        yield Margin(
+            "joint_range", 1.0 - np.abs(course.q_rad - (low + high) / 2.0) / half, course.q_rad, course.physics_s
+        )
         speed = np.abs(course.qd_rad_s)
-        yield Margin("joint_speed", 1.0 - speed / [j.speed_rad_s for j in joints], speed)
+        yield Margin("joint_speed", 1.0 - speed / [j.speed_rad_s for j in joints], speed, course.physics_s)
         rate = _accelerations(course)
         if len(rate):
-            yield Margin("joint_acceleration", 1.0 - rate / [j.acceleration_rad_s2 for j in joints], rate)
+            yield Margin(
+                "joint_acceleration", 1.0 - rate / [j.acceleration_rad_s2 for j in joints], rate, course.physics_s
+            )
 
     def _set_points(self, course: Course) -> Iterator[Margin]:
         """Read what reached the drives: its differences over ticks, exact where the joints themselves lag and swing.
@@ -100,41 +105,46 @@ class Monitor:
                 return
             rate = np.diff(rate, axis=0) / tick_s
             came = np.where(odd[len(odd) - len(rate) :, None], 0.0, np.abs(rate))
-            yield Margin(name, 1.0 - came / most, came)
+            yield Margin(name, 1.0 - came / most, came, tick_s)
         moved = self._pointed.speeds(course.set_point_rad, tick_s)
         moved = np.where(odd[len(odd) - len(moved) :, None], 0.0, moved)
         for i, (name, most) in enumerate(_point_speeds(self._profile)):
-            yield Margin(f"command_{name}_speed", 1.0 - moved[:, i] / most, moved[:, i])
+            yield Margin(f"command_{name}_speed", 1.0 - moved[:, i] / most, moved[:, i], tick_s)
 
     def _speeds(self, course: Course) -> Iterator[Margin]:
         for i, (name, most) in enumerate(_point_speeds(self._profile)):
             came = course.speed_m_s[:, i]
-            yield Margin(f"{name}_speed", 1.0 - came / most, came)
+            yield Margin(f"{name}_speed", 1.0 - came / most, came, course.physics_s)
 
     def _space(self, course: Course) -> Iterator[Margin]:
         space = self._profile.workspace
         for box in space.boxes:
             middle, half = _middle(box.low_m, box.high_m), _half(box.low_m, box.high_m)
             inside = np.stack([1.0 - np.abs(_at(course, p) - middle) / half for p in box.parts], axis=1)
-            yield Margin(f"box:{box.name}", inside, inside)
+            yield Margin(f"box:{box.name}", inside, inside, course.physics_s)
         for plane in space.planes:
             height = np.stack([_over(plane, _at(course, p)) for p in plane.parts], axis=1)
-            yield Margin(f"plane:{plane.name}", height / plane_scale_m(plane), height)
+            yield Margin(f"plane:{plane.name}", height / plane_scale_m(plane), height, course.physics_s)
         for keep in space.keep_outs:
             away = np.stack([_outside(keep, _at(course, p)) for p in keep.parts], axis=1)
-            yield Margin(f"keep_out:{keep.name}", away / keep_out_scale_m(keep), away)
+            yield Margin(f"keep_out:{keep.name}", away / keep_out_scale_m(keep), away, course.physics_s)
         tilt = np.arccos(np.clip(-course.approach[:, 2], -1.0, 1.0))
-        yield Margin("tool_cone", 1.0 - tilt / space.tool_cone_rad, tilt)
+        yield Margin("tool_cone", 1.0 - tilt / space.tool_cone_rad, tilt, course.physics_s)
 
     def _grip(self, course: Course) -> Iterator[Margin]:
         grip = self._profile.grip
-        yield Margin("grip_force", 1.0 - course.grip_force_n / grip.force_n[1], course.grip_force_n)
+        yield Margin("grip_force", 1.0 - course.grip_force_n / grip.force_n[1], course.grip_force_n, course.physics_s)
         speed = _finger_speeds(course)
         if len(speed):
-            yield Margin("grip_speed", 1.0 - speed / grip.speed_m_s[1], speed)
+            yield Margin("grip_speed", 1.0 - speed / grip.speed_m_s[1], speed, course.physics_s)
         low, high = grip.opening_m
         half = (high - low) / 2.0
-        yield Margin("grip_opening", 1.0 - np.abs(course.opening_m - (low + high) / 2.0) / half, course.opening_m)
+        yield Margin(
+            "grip_opening",
+            1.0 - np.abs(course.opening_m - (low + high) / 2.0) / half,
+            course.opening_m,
+            course.physics_s,
+        )
 
     def _clearance(self, name: str, near: Nearest, least_m: float, tick_s: float) -> Reading:
         if least_m <= 0.0:
@@ -234,7 +244,7 @@ def _stops(course: Course, profile: Profile) -> Iterator[Reading]:
         moving = np.flatnonzero(course.speed_m_s[begin:end].max(axis=1) > REST_M_S)
         last = int(moving[-1]) + 1 if len(moving) else 0
         longest = max(longest, last * course.physics_s)
-        path = np.diff(course.position_m[begin : begin + last + 1, 0], axis=0)
+        path = np.diff(course.position_m[begin : min(begin + last + 1, end), 0], axis=0)
         farthest = max(farthest, float(np.linalg.norm(path, axis=1).sum()))
     stopping, at_s = profile.stopping, float(begins[0]) * course.physics_s
     yield Reading(limit="stop_time", share=1.0 - longest / stopping.time_s, value=longest, at_s=at_s)

@@ -33,13 +33,15 @@ class Margin(msgspec.Struct, frozen=True):
     """(n,) or (n, k): of k joints, axes or parts"""
     value: Array
     """As share, in the limit's own unit."""
+    dt_s: float
+    """Between two instants."""
 
     @property
     def least(self) -> Array:
         """The least share at each instant.  () -> (n,)"""
         return self.share.reshape(len(self.share), -1).min(axis=1)
 
-    def worst(self, dt_s: float) -> Reading:
+    def worst(self) -> Reading:
         """Return the least of all, the value there, when that was and of which column."""
         k = int(np.argmin(self.share))
         columns = self.share.size // len(self.share)
@@ -47,6 +49,6 @@ class Margin(msgspec.Struct, frozen=True):
             limit=self.limit,
             share=float(self.share.flat[k]),
             value=float(self.value.flat[k]),
-            at_s=k // columns * dt_s,
+            at_s=k // columns * self.dt_s,
             detail=f"#{k % columns + 1}" if columns > 1 else "",
         )

@@ -91,7 +91,7 @@ def draw(setup: Setup, report: CheckReport, path: Path) -> None:
         course = ring.course
         assert course is not None, "a stream was run"
         for margin in ring.margins():
-            times = [k * course.physics_s for k in range(len(margin.least))]
+            times = [k * margin.dt_s for k in range(len(margin.least))]
             is_it = margin.limit == row.limit
             axes.plot(
                 times, margin.least, lw=1.4 if is_it else 0.5, color="tab:red" if is_it else "0.7", zorder=2 + is_it
