@@ -16,10 +16,10 @@ from robot.errors import ArmRefusedError, RobotConfigError, StaleStateError, Wir
 from robot.hal.protocols import Arm
 from robot.kinematics import ToolChain
 from robot.messages import ArmCommand, ArmState, GripCommand, Intent, Limited, Vec3, Verdict
-from robot.motion import Mover
-from robot.safety import Gate, GateLimits, Reason, check_profile_fits
+from robot.motion import Approach, Mover
+from robot.safety import Braking, Clearance, Gate, GateLimits, Hard, Reason, StopCheck, check_profile_fits
 
-__all__ = ["Stride", "TickLoop"]
+__all__ = ["Stride", "TickLoop", "guarded"]
 
 WHOLE_TICKS = 1e-6
 
@@ -40,6 +40,33 @@ class Stride(msgspec.Struct, frozen=True, kw_only=True):
     """The limiters, each with by how much."""
     verdict: Verdict | None = None
     """The gate's refusal, if it refused."""
+
+
+def guarded(
+    *,
+    arm: Arm,
+    config: ArmConfig,
+    scenario: Scenario,
+    rig: Rig,
+    profile: Profile,
+    when_latched: Callable[[Verdict], object] | None,
+) -> tuple[Mover, Gate]:
+    """Return motion and gate of one arm at one table, bodies kept apart by both, by distances that each has of its own.
+
+    The arm's file is already no wider than the profile.
+    """
+    table_m, tick_s, braking = scenario.table.height_m, rig.tick_s, Braking()
+    kept = profile.clearances
+    hard = Hard(own_m=kept.self_m, table_m=kept.scene_m, thing_m=kept.scene_m)
+    envelope = Envelope.of(profile, config, tick_s=tick_s)
+    limits = GateLimits.of(config, arm.spec, table_m=table_m, tick_s=tick_s)
+    approach = Approach(config, Clearance(config, scenario, hard=hard), braking=braking)
+    stops = StopCheck(config, Clearance(config, scenario, hard=hard), limits=limits, tick_s=tick_s, braking=braking)
+    mover = Mover(config, envelope=envelope, table_m=table_m, tick_s=tick_s, approach=approach)
+    gate = Gate(
+        arm=arm, limits=limits, envelope=envelope, chain=ToolChain(config), when_latched=when_latched, stops=stops
+    )
+    return mover, gate
 
 
 class TickLoop:
@@ -76,15 +103,13 @@ class TickLoop:
         """
         if abs(arm.spec.rate_hz * rig.tick_s - 1.0) > WHOLE_TICKS:
             raise RobotConfigError(f"rig {rig.name}: tick {rig.tick_s} s, the plant's is {1 / arm.spec.rate_hz} s")
-        table_m = scenario.table.height_m
         self._arm = arm
         check_profile_fits(profile, arm.spec)
         config = limited(config, profile)
-        envelope = Envelope.of(profile, config, tick_s=rig.tick_s)
         self._cell = Cell(scenario=scenario, rule_sets=rule_sets, arm=config)
-        self._mover = Mover(config, envelope=envelope, table_m=table_m, tick_s=rig.tick_s)
-        limits = GateLimits.of(config, arm.spec, table_m=table_m, tick_s=rig.tick_s)
-        self._gate = Gate(arm=arm, limits=limits, envelope=envelope, chain=ToolChain(config), when_latched=when_latched)
+        self._mover, self._gate = guarded(
+            arm=arm, config=config, scenario=scenario, rig=rig, profile=profile, when_latched=when_latched
+        )
         self._tick_s, self._tick_ns = rig.tick_s, round(rig.tick_s * 1e9)
         self.state: ArmState
         self._read_ns = self._epoch = 0

@@ -126,12 +126,19 @@ class Follower:
         self._joints.aim(list(q_rad))
         self.target_m = self._kinematics.tcp(q_rad)
 
-    def joints_at(self, place_m: Vec3) -> Vec6 | None:
-        """Return joints near the present ones that bring the tool to a place; None where none do, or it is tilted."""
+    def joints_at(self, place_m: Vec3, yaw_rad: float | None = None, seed_rad: Vec6 | None = None) -> Vec6 | None:
+        """Return joints near the present ones that bring the tool to a place; None where none do, or it is tilted.
+
+        Args:
+            place_m: where the tool centre point would be.
+            yaw_rad: its turn; the one at which it will rest where absent.
+            seed_rad: neighbours of the answer; the present joints where absent.
+        """
         if not self._is_upright:
             return None
         try:
-            return self._kinematics.solve(place_m, self.q_rad, yaw_rad=self.yaw_rad)
+            yaw = self.yaw_rad if yaw_rad is None else yaw_rad
+            return self._kinematics.solve(place_m, self.q_rad if seed_rad is None else seed_rad, yaw_rad=yaw)
         except UnreachableError:
             return None
 

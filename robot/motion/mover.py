@@ -7,6 +7,7 @@ from config.arm import ArmConfig
 from robot.envelope import Envelope
 from robot.geometry import inside_box
 from robot.messages import ArmState, Heading, Intent, JointTarget, Limited, Twist, Vec3, Vec6
+from robot.motion.approach import Approach
 from robot.motion.contact import ContactGuard
 from robot.motion.follower import Follower
 from robot.motion.holding import MARGIN_M, MARGIN_RAD, share_of_giving_way
@@ -38,7 +39,19 @@ RESEAT_SHARE = 0.9
 class Mover:
     """Carries the target from intent to intent. `seed` forgets everything before."""
 
-    def __init__(self, arm: ArmConfig, *, envelope: Envelope, table_m: float, tick_s: float) -> None:
+    def __init__(
+        self, arm: ArmConfig, *, envelope: Envelope, table_m: float, tick_s: float, approach: Approach | None = None
+    ) -> None:
+        """Put the parts together.
+
+        Args:
+            arm: the arm's file.
+            envelope: what of the limits profile is held besides.
+            table_m: height of the table's top, base frame.
+            tick_s: how long a tick is.
+            approach: what keeps targets clear of bodies and singular postures; None where there are none.
+        """
+        self._approach = approach
         self._limits = TargetLimits.of(arm, table_m)
         self._follower = Follower(arm, envelope=envelope, tick_s=tick_s)
         self._envelope = envelope
@@ -144,7 +157,7 @@ class Mover:
             back = _along(follower.q_rad, change, share)
         follower.seed(back)
         self._trail.seed(back)
-        follower.aim(fence(target_m, state.tcp_position_m, self._limits).position_m, yaw)
+        follower.aim(self._clear(fence(target_m, state.tcp_position_m, self._limits).position_m, yaw), yaw)
         return back
 
     def _back_inside(self, state: ArmState) -> Vec6:
@@ -172,8 +185,33 @@ class Mover:
         fenced = self._fenced(eased, state)
         for name in fenced.limiters:
             self._note(name, math.dist(fenced.position_m, eased))
-        if not self._follower.aim(fenced.position_m, yaw_rad):
+        place_m = self._clear(fenced.position_m, yaw_rad)
+        tilted_rad = None if self._follower.is_upright else self._follower.joint_target_rad
+        if not self._follower.aim(place_m, yaw_rad):
             self._note("unreachable")
+        elif tilted_rad is not None and not self._follower.is_upright:
+            self._aim_clear(tilted_rad, self._follower.joint_target_rad)
+
+    def _clear(self, target_m: Vec3, yaw_rad: float) -> Vec3:
+        """Keep the target of an upright tool from leading into bodies and singular postures."""
+        follower, approach = self._follower, self._approach
+        if approach is None or not follower.is_upright:
+            return target_m
+        at_m = follower.target_m
+        place_m, because = approach.clear_place(
+            at_m, target_m, now_rad=follower.q_rad, joints_at=lambda p, seed: follower.joints_at(p, yaw_rad, seed)
+        )
+        if because is not None:
+            self._note(because, math.dist(place_m, target_m))
+        return place_m
+
+    def _aim_clear(self, now: Vec6, wanted: Vec6) -> None:
+        """Aim at joints, as far as the way there is clear of bodies."""
+        if self._approach is not None:
+            asked, (wanted, because) = wanted, self._approach.clear_joints(now, wanted)
+            if because is not None:
+                self._note(because, max(abs(a - b) for a, b in zip(asked, wanted, strict=True)))
+        self._follower.aim_joints(wanted)
 
     def _aim_joints(self, wanted_rad: Vec6, state: ArmState, duration_s: float) -> None:
         """Move the joint target towards given joints, the tool by no more than a step and inside the fences."""
@@ -207,7 +245,7 @@ class Mover:
         """Aim at joints, or as near them as every part is inside of its fences and the tool inside of its cone."""
         beyond = self._beyond(q)
         if beyond is None:
-            self._follower.aim_joints(q)
+            self._aim_clear(now, q)
             return
         self._note(*beyond)
         change, share, width = [b - a for a, b in zip(now, q, strict=True)], 0.0, 0.5
@@ -216,7 +254,7 @@ class Mover:
                 share += width
             width /= 2
         if share > 0.0:
-            self._follower.aim_joints(_along(now, change, share))
+            self._aim_clear(now, _along(now, change, share))
 
     def _beyond(self, q_rad: Vec6) -> tuple[str, float] | None:
         """Return which fence or cone joints would be beyond and by how much, None where all is inside."""

@@ -71,6 +71,9 @@ class Reason(StrEnum):
     FORCE = "force"
     GRIP = "grip"
     OUTPUTS = "outputs"
+    CLEARANCE = "clearance"
+    STOP_RANGE = "stop_range"
+    STOP_WORKSPACE = "stop_workspace"
 
 
 class Refusal(msgspec.Struct, frozen=True):

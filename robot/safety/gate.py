@@ -31,6 +31,7 @@ from robot.safety.checks_profile import (
     check_soft_margin,
 )
 from robot.safety.limits import GateLimits
+from robot.safety.stop_check import StopCheck
 
 __all__ = ["Gate"]
 
@@ -52,6 +53,7 @@ class Gate:
         envelope: Envelope,
         chain: ToolChain,
         when_latched: Callable[[Verdict], object] | None = None,
+        stops: StopCheck | None = None,
     ) -> None:
         """Store.
 
@@ -61,9 +63,10 @@ class Gate:
             envelope: what of the limits profile is held besides.
             chain: where the tool is for given joints.
             when_latched: told of the refusal that latches, before the arm is stopped: a stop takes its time.
+            stops: what verifies the stop that would follow each command; None where bodies are no matter.
         """
         self._arm, self._limits, self._envelope, self._chain = arm, limits, envelope, chain
-        self._when_latched = when_latched
+        self._when_latched, self._stops = when_latched, stops
         self._sequence = 0
         self._force_before_n = 0.0
         self._q_rad = self._q_before_rad = AT_ZERO
@@ -100,6 +103,8 @@ class Gate:
         self._force_before_n = 0.0
         self._intent_ns = state.stamp_ns
         self._latched = None
+        if self._stops is not None:
+            self._stops.seed()
 
     def admit(self, intent: object, *, now_ns: int) -> Verdict | None:
         """Take note of a fresh intent. A wrong one is refused and latches; None means admitted."""
@@ -146,6 +151,7 @@ class Gate:
                 or check_tool(q, self._chain, limits)
                 or check_intent_age(self._intent_ns, now_ns, limits)
                 or self._check_envelope(q, state.q_rad)
+                or (None if self._stops is None else self._stops.check(q, self._q_rad, state))
             )
         return refusal or check_tracking(q, state.q_rad, limits)
 
