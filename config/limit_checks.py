@@ -4,11 +4,16 @@ import math
 
 from config.arm import ArmConfig
 from config.checks import Checker
-from config.limits import ATTENDED, ATTENDED_SPEED_M_S, LimitsFile, Plane, Profile
+from config.limited import FENCE_MARGIN_M
+from config.limits import ATTENDED, ATTENDED_SPEED_M_S, ArmPart, Fence, KeepOut, LimitsFile, Plane, Profile
+from config.posture import part_points, tilt_rad
+from config.scenario import Scenario
+from config.values import Point
 from config.yaml_text import join
 
 __all__ = ["check_limits", "check_limits_fit", "check_profile_named"]
 
+ROUNDING_M = 1e-9
 TAKEN = "reduced"
 """A name of UR's own, for a mode of the controller's safety system."""
 
@@ -26,11 +31,112 @@ def check_profile_named(limits: LimitsFile, name: str, rig_file: str) -> None:
     Checker(rig_file).known(name, (profile.name for profile in limits.profiles), "profile", f"one of {limits.name}'s")
 
 
-def check_limits_fit(limits: LimitsFile, arm: ArmConfig, file: str) -> None:
-    """Check that a limits file is for this arm and its tool."""
+def check_limits_fit(limits: LimitsFile, arm: ArmConfig, scenario: Scenario, file: str) -> None:
+    """Check that a limits file is for this arm and its tool, and that each profile leaves the arm a home and room.
+
+    Args:
+        limits: the file.
+        arm: the arm, its workspace cut to the scenario's.
+        scenario: the table.
+        file: what errors call the limits file.
+    """
     checker = Checker(file)
     checker.need(limits.arm == arm.name, "arm", f"{arm.name}, the arm that the rig names", limits.arm)
     checker.need(limits.tool == arm.tool.name, "tool", f"{arm.tool.name}, the arm's tool", limits.tool)
+
+    for i, profile in enumerate(limits.profiles):
+        where = f"profiles[{i}]"
+        _check_home(profile, arm, where, checker)
+        _check_room(profile, arm, scenario, where, checker)
+        _check_grip(profile, arm, where, checker)
+        _check_stopping(profile, arm, where, checker)
+
+
+def _check_home(profile: Profile, arm: ArmConfig, where: str, checker: Checker) -> None:
+    """Check that the arm's home is inside of every range, fence and cone."""
+    for i, (joint, home_rad) in enumerate(zip(profile.joints, arm.home_rad, strict=True)):
+        low, high = joint.range_rad
+        expected = f"a range with the arm's home_rad[{i}] {home_rad:g} in it, soft_margin_rad inside of its ends"
+        is_in = low + joint.soft_margin_rad <= home_rad <= high - joint.soft_margin_rad
+        checker.need(is_in, f"{where}.joints[{i}].range_rad", expected, f"{low:g} to {high:g}")
+    points, space, at = part_points(arm, arm.home_rad), profile.workspace, f"{where}.workspace"
+    for group in ("boxes", "planes", "keep_outs"):
+        for i, thing in enumerate(getattr(space, group)):
+            for part in thing.parts:
+                x, y, z = points[part]
+                expected = (
+                    f"{thing.name} to leave the {part} at home, ({x:.3f}, {y:.3f}, {z:.3f}) m, on the allowed side"
+                )
+                checker.need(gap_m(thing, points[part]) > 0.0, f"{at}.{group}[{i}]", expected, "it beyond")
+    tilt = tilt_rad(arm, arm.home_rad)
+    expected = f"more than {tilt:g}, the tool's tilt at home"
+    checker.need(space.tool_cone_rad > tilt, f"{at}.tool_cone_rad", expected, f"{space.tool_cone_rad:g}")
+
+
+def _check_room(profile: Profile, arm: ArmConfig, scenario: Scenario, where: str, checker: Checker) -> None:
+    """Check that boxes leave the tool all of a workspace that the scenario names, and its heights over the table."""
+    lowest, travel = (scenario.table.height_m + height for height in arm.motion.heights_m)
+    low, high = list(arm.motion.workspace_m[0]), list(arm.motion.workspace_m[1])
+    what = "the scenario's workspace_m"
+    if scenario.workspace_m is None:
+        what = "the home and the heights that the tool comes to"
+        home = part_points(arm, arm.home_rad)[ArmPart.TCP]
+        low, high = [home[0], home[1], lowest], [home[0], home[1], travel]
+    for i, box in enumerate(profile.workspace.boxes):
+        if ArmPart.TCP not in box.parts:
+            continue
+        at, m = f"{where}.workspace.boxes[{i}]", FENCE_MARGIN_M
+        for axis in range(3):
+            least, most = f"at most {low[axis] - m:g}, for {what}", f"at least {high[axis] + m:g}, for {what}"
+            is_low, is_high = (
+                box.low_m[axis] <= low[axis] - m + ROUNDING_M,
+                box.high_m[axis] >= high[axis] + m - ROUNDING_M,
+            )
+            checker.need(is_low, f"{at}.low_m[{axis}]", least, f"{box.low_m[axis]:g}")
+            checker.need(is_high, f"{at}.high_m[{axis}]", most, f"{box.high_m[axis]:g}")
+
+
+def _check_grip(profile: Profile, arm: ArmConfig, where: str, checker: Checker) -> None:
+    """Check that what the hand is asked while working is allowed."""
+    tool, grip = arm.tool, profile.grip
+    asked = (
+        ("opening_m", (0.0, tool.stroke_m), "0 to the tool's stroke_m"),
+        ("force_n", (tool.grip_force_n, tool.grip_force_n), "a range with the tool's grip_force_n in it"),
+    )
+    for key, (least, most), what in asked:
+        low, high = getattr(grip, key)
+        is_in = low <= least and most <= high
+        checker.need(is_in, f"{where}.grip.{key}", f"{what}, {least:g} to {most:g}", f"{low:g} to {high:g}")
+    low, high = max(tool.speed_m_s[0], grip.speed_m_s[0]), min(tool.speed_m_s[1], grip.speed_m_s[1])
+    expected = f"a range that meets the tool's {tool.speed_m_s[0]:g} to {tool.speed_m_s[1]:g}"
+    got = f"{grip.speed_m_s[0]:g} to {grip.speed_m_s[1]:g}"
+    checker.need(low < high, f"{where}.grip.speed_m_s", expected, got)
+
+
+def _check_stopping(profile: Profile, arm: ArmConfig, where: str, checker: Checker) -> None:
+    """Check that motion as it is tuned comes to rest within what is allowed, the servo's look-ahead included."""
+    motion = arm.motion
+    speed = min(motion.speed_m_s, profile.speeds.tcp_m_s)
+    time_s = speed / motion.acceleration_m_s2 + motion.acceleration_m_s2 / motion.jerk_m_s3
+    distance_m = speed * time_s / 2.0 + speed * arm.servo.lookahead_s
+    time_s += arm.servo.lookahead_s
+    for key, needed in (("distance_m", distance_m), ("time_s", time_s)):
+        allowed = getattr(profile.stopping, key)
+        expected = f"at least {needed:.3f}, what motion takes from {speed:g} m/s, or a slower speeds.tcp_m_s"
+        checker.need(allowed >= needed, f"{where}.stopping.{key}", expected, f"{allowed:g}")
+
+
+def gap_m(fence: Fence | Plane | KeepOut, point_m: Point) -> float:
+    """Return how far a point is on the allowed side of a fence, negative beyond."""
+    if isinstance(fence, Plane):
+        away = zip(point_m, fence.point_m, fence.normal, strict=True)
+        return sum((p - q) * n for p, q, n in away) / math.hypot(*fence.normal)
+    sides = list(zip(fence.low_m, point_m, fence.high_m, strict=True))
+    inside = min(min(p - low, high - p) for low, p, high in sides)
+    if isinstance(fence, Fence):
+        return inside
+    outside = math.hypot(*(max(low - p, 0.0, p - high) for low, p, high in sides))
+    return (outside if outside > 0.0 else -inside) - fence.radius_m
 
 
 def _check_profile(profile: Profile, where: str, checker: Checker) -> None:

@@ -60,7 +60,8 @@ class JointLimit(Section, frozen=True, kw_only=True):
     soft_margin_rad: Annotated[float, Meta(ge=0.0, le=3.0)]
     """So near an end the joint goes slower towards it the nearer it is; away from it as fast as anywhere."""
     speed_rad_s: Annotated[float, Meta(gt=0.0, le=10.0)]
-    acceleration_rad_s2: Annotated[float, Meta(gt=0.0, le=100.0)]
+    acceleration_rad_s2: Annotated[float, Meta(gt=0.0, le=1000.0)]
+    """Greatest change of the commanded speed; braking and giving way to a push may be as hard as they will."""
     jerk_rad_s3: Annotated[float, Meta(gt=0.0, le=10_000.0)]
 
 

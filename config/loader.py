@@ -12,6 +12,7 @@ from config.decode import decode
 from config.errors import ConfigError
 from config.learning import LearningConfig
 from config.limit_checks import check_limits, check_limits_fit, check_profile_named
+from config.limited import limited
 from config.limits import LimitsFile
 from config.placing import check_fit, check_placing
 from config.resolved import Resolved
@@ -294,8 +295,8 @@ def _check_together(resolved: Resolved, files: _Files) -> None:
             files.arm, "motion.step_s", f"whole ticks of the rig's {rig.tick_s:g} s", f"{arm.motion.step_s:g}"
         )
     check_profile_named(resolved.limits, rig.profile, files.rig)
-    check_limits_fit(resolved.limits, arm, files.limits)
-    check_fit(resolved.scenario, arm, files.scenario)
+    check_limits_fit(resolved.limits, arm, resolved.scenario, files.limits)
+    check_fit(resolved.scenario, limited(arm, resolved.profile), files.scenario)
     if resolved.cell is not None:
         check_cell_fits(resolved.scenario, resolved.cell, files.cell)
 

@@ -18,6 +18,7 @@ import numpy as np
 import placo
 
 from config.arm import ArmConfig
+from config.posture import elbow_point
 from robot.description import tool_down, write_mjcf
 from robot.downward import DownwardArm
 from robot.errors import RobotError
@@ -26,6 +27,8 @@ from robot.messages import Quat, Vec3, Vec6
 __all__ = ["Kinematics", "ToolChain", "UnreachableError"]
 
 N_JOINTS = 6
+N_TO_ELBOW = 2
+"""Joints that move the elbow."""
 TOLERANCE = 1e-5
 """A solution is off by no more than this, in metres."""
 NEAR = 1e-3
@@ -53,6 +56,7 @@ class ToolChain:
         x, y, z = arm.tool.tcp_m
         self._tip = (x, y, z + arm.tool.tip_below_tcp_m)
         self._tip_m = arm.tool.tip_below_tcp_m
+        self._elbow = elbow_point(arm)
         self._finger_m = arm.tool.stroke_m / 2 + arm.tool.pad_size_m[0]
 
     def tcp(self, q_rad: Vec6) -> Vec3:
@@ -88,6 +92,31 @@ class ToolChain:
         tcp, tip = self.tcp_and_tip(q_rad)
         cosine = (tcp[2] - tip[2]) / self._tip_m
         return tcp, tip[2] - self._finger_m * math.sqrt(max(0.0, 1.0 - cosine * cosine))
+
+    def points(self, q_rad: Vec6) -> tuple[tuple[Vec3, Vec3, Vec3], float]:
+        """Return tool centre point, flange and elbow, base frame, metres, and how far the tool points down, -1 to 1.
+
+        The last is the cosine of the angle between the approach axis and straight down.
+        """
+        x, y, z = self._tcp
+        tx, ty, tz = self._tip
+        fx = fy = fz = ex = ey = ez = 0.0
+        i = N_JOINTS
+        for a, d, ca, sa in self._rows:
+            i -= 1
+            s, c = math.sin(q_rad[i]), math.cos(q_rad[i])
+            u, v = x + a, ca * y - sa * z
+            x, y, z = c * u - s * v, s * u + c * v, sa * y + ca * z + d
+            u, v = tx + a, ca * ty - sa * tz
+            tx, ty, tz = c * u - s * v, s * u + c * v, sa * ty + ca * tz + d
+            u, v = fx + a, ca * fy - sa * fz
+            fx, fy, fz = c * u - s * v, s * u + c * v, sa * fy + ca * fz + d
+            if i < N_TO_ELBOW:
+                if i == N_TO_ELBOW - 1:
+                    ex, ey, ez = self._elbow
+                u, v = ex + a, ca * ey - sa * ez
+                ex, ey, ez = c * u - s * v, s * u + c * v, sa * ey + ca * ez + d
+        return ((x, y, z), (fx, fy, fz), (ex, ey, ez)), (z - tz) / self._tip_m
 
     def quat(self, q_rad: Vec6) -> Quat:
         """Return the tool's turn, scalar first: the product of Rz(q_i) Rx(alpha_i) as unit quaternions."""

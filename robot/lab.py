@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+from config.limited import limited
 from config.resolved import Resolved
 from config.rig import Rig
 from robot.bus import open_session
@@ -51,7 +52,7 @@ def build_lab_station(
         RobotConfigError: the rig names no bus.
         BusError: nobody listens at its endpoint.
     """
-    rig = resolved.rig
+    rig, arm = resolved.rig, limited(resolved.arm, resolved.profile)
     if rig.bus is None:
         raise RobotConfigError(f"rig {rig.name}: expected the endpoint of its bus, came none")
     if is_driven and rig.reset == "person":
@@ -65,7 +66,7 @@ def build_lab_station(
         )
         world = _LabWorld(loop=loop, truth=truth, resetter=by_person)
         station = PersonResetStation(
-            world=world, loop=loop, perception=perception, arm=resolved.arm, scenario=resolved.scenario, rig=rig,
+            world=world, loop=loop, perception=perception, arm=arm, scenario=resolved.scenario, rig=rig,
             cell_shows=_pendant_of(rig),
         )  # fmt: skip
         station.prepare(by_person, resolved.arm.home_rad)
@@ -73,18 +74,18 @@ def build_lab_station(
     resetter = RemoteResetter(session, rig.expected.serial, loop=loop, truth=truth)
     world = _LabWorld(loop=loop, truth=truth, resetter=resetter)
     return LocalStation(
-        world=world, loop=loop, perception=perception, arm=resolved.arm, scenario=resolved.scenario, rig=rig,
-        hand=AskedHand(resolved.arm) if is_driven else None, cell_shows=_pendant_of(rig),
+        world=world, loop=loop, perception=perception, arm=arm, scenario=resolved.scenario, rig=rig,
+        hand=AskedHand(arm) if is_driven else None, cell_shows=_pendant_of(rig),
     )  # fmt: skip
 
 
 def _driven_station(resolved: Resolved, perception: Perceives) -> LocalStation:
     """Return the station of an arm that a person drives and whose table a person sees to."""
-    loop = ServoClient(resolved)
+    loop, arm = ServoClient(resolved), limited(resolved.arm, resolved.profile)
     world = _LabWorld(loop=loop, truth=None, resetter=PersonLook(loop=loop, person=TerminalPerson()))
     return LocalStation(
-        world=world, loop=loop, perception=perception, arm=resolved.arm, scenario=resolved.scenario, rig=resolved.rig,
-        hand=AskedHand(resolved.arm), cell_shows=_pendant_of(resolved.rig),
+        world=world, loop=loop, perception=perception, arm=arm, scenario=resolved.scenario, rig=resolved.rig,
+        hand=AskedHand(arm), cell_shows=_pendant_of(resolved.rig),
     )  # fmt: skip
 
 

@@ -211,6 +211,11 @@ class LocalStation:
         return self._percept
 
     @property
+    def loop(self) -> Loop:
+        """Who holds the arm, for whoever checks it past the station's door."""
+        return self._loop
+
+    @property
     def model_sha256(self) -> str | None:
         """Digest of the world's model, where it is a simulated one in this process."""
         return getattr(self._world, "model_sha256", None)
@@ -227,11 +232,7 @@ class LocalStation:
             self._is_connected = True
 
     def take_lease(self, source: str, *, life_ns: int | None = None) -> Lease:
-        """Give the lease to a source, which every step of the station is for from now on.
-
-        Args:
-            source: its name.
-            life_ns: without a step for longer than this the lease ends; None where the source cannot vanish alone.
+        """Give the lease to a source; without a step for longer than its life it ends (None: it never does).
 
         Raises:
             SafetyError: another source has it.
@@ -369,6 +370,7 @@ class LocalStation:
                 moved_m=(x1 - x0, y1 - y0, z1 - z0),
                 target_m=stride.target_m,
                 limiters=(*stride.limiters, "object_lost") if is_lost else stride.limiters,
+                limited=stride.limited,
             ),
             verdicts=verdicts,
             is_void=is_lost or bool(verdicts),

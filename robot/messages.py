@@ -23,6 +23,7 @@ __all__ = [
     "Hold",
     "Intent",
     "JointTarget",
+    "Limited",
     "ObjectPercept",
     "ObjectPose",
     "Outcome",
@@ -231,6 +232,14 @@ class Verdict(Message, frozen=True, kw_only=True):
     is_latched: bool = False
 
 
+class Limited(Message, frozen=True, kw_only=True):
+    """What changed a step on its way to a command, and by how much."""
+
+    name: str
+    amount: float
+    """Greatest in the step: metres where the target was moved, radians for joint_range, else a share of the step."""
+
+
 class Executed(Message, frozen=True, kw_only=True):
     """What was really carried out of an intent."""
 
@@ -241,6 +250,8 @@ class Executed(Message, frozen=True, kw_only=True):
     """Where the tool centre point will come to rest if nothing more is asked (the shaped target)."""
     limiters: tuple[str, ...] = ()
     """What shortened or changed the intent (leash, guard, workspace, ...)."""
+    limited: tuple[Limited, ...] = ()
+    """The same, each with by how much."""
 
 
 # --------------------------------------------------------------------------------------------------- plant, station

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from config.arm import ArmConfig
 from config.cell import CellConfig
+from config.limited import limited
 from config.resolved import Resolved
 from config.rig import Rig
 from config.scenario import Scenario
@@ -89,10 +90,13 @@ def build_station(
     world = build_plant(rig=rig, arm=arm, scenario=scenario, cell=resolved.cell) if plant is None else plant
     if heard_by is not None:
         time_world(world, heard_by)
-    loop = TickLoop(arm=world.arm, config=arm, scenario=scenario, rule_sets=resolved.rule_sets, rig=rig)
+    loop = TickLoop(
+        arm=world.arm, config=arm, scenario=scenario, rule_sets=resolved.rule_sets, rig=rig, profile=resolved.profile
+    )
+    held = limited(arm, resolved.profile)
     return LocalStation(
-        world=world, loop=loop, perception=perception, arm=arm, scenario=scenario, rig=rig,
-        hand=AskedHand(arm) if is_driven else None, cell_shows=cell_shows, host_ns=host_ns,
+        world=world, loop=loop, perception=perception, arm=held, scenario=scenario, rig=rig,
+        hand=AskedHand(held) if is_driven else None, cell_shows=cell_shows, host_ns=host_ns,
     )  # fmt: skip
 
 

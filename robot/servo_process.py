@@ -107,6 +107,7 @@ def serve(connection: Connection, resolved_json: bytes, pulse: MutableSequence[i
         scenario=resolved.scenario,
         rule_sets=resolved.rule_sets,
         rig=resolved.rig,
+        profile=resolved.profile,
         when_latched=latched,
     )
     server = ServoServer(

@@ -5,18 +5,21 @@ from collections.abc import Callable
 import msgspec
 
 from config.arm import ArmConfig
+from config.limited import limited
+from config.limits import Profile
 from config.rig import Rig
 from config.rules import RuleSet
 from config.scenario import Scenario
 from robot.cell import Cell
+from robot.envelope import Envelope
 from robot.errors import ArmRefusedError, RobotConfigError, StaleStateError, WireError
 from robot.hal.protocols import Arm
 from robot.kinematics import ToolChain
-from robot.messages import ArmCommand, ArmState, GripCommand, Intent, Vec3, Verdict
-from robot.motion import Mover
-from robot.safety import Gate, GateLimits, Reason
+from robot.messages import ArmCommand, ArmState, GripCommand, Intent, Limited, Vec3, Verdict
+from robot.motion import Approach, Mover
+from robot.safety import Braking, Clearance, Gate, GateLimits, Hard, Reason, StopCheck, check_profile_fits
 
-__all__ = ["Stride", "TickLoop"]
+__all__ = ["Stride", "TickLoop", "guarded"]
 
 WHOLE_TICKS = 1e-6
 
@@ -33,8 +36,37 @@ class Stride(msgspec.Struct, frozen=True, kw_only=True):
     """Where the tool centre point will rest if nothing more is asked."""
     limiters: tuple[str, ...]
     is_in_contact: bool
+    limited: tuple[Limited, ...] = ()
+    """The limiters, each with by how much."""
     verdict: Verdict | None = None
     """The gate's refusal, if it refused."""
+
+
+def guarded(
+    *,
+    arm: Arm,
+    config: ArmConfig,
+    scenario: Scenario,
+    rig: Rig,
+    profile: Profile,
+    when_latched: Callable[[Verdict], object] | None,
+) -> tuple[Mover, Gate]:
+    """Return motion and gate of one arm at one table, bodies kept apart by both, by distances that each has of its own.
+
+    The arm's file is already no wider than the profile.
+    """
+    table_m, tick_s, braking = scenario.table.height_m, rig.tick_s, Braking()
+    kept = profile.clearances
+    hard = Hard(own_m=kept.self_m, table_m=kept.scene_m, thing_m=kept.scene_m)
+    envelope = Envelope.of(profile, config, tick_s=tick_s)
+    limits = GateLimits.of(config, arm.spec, table_m=table_m, tick_s=tick_s)
+    approach = Approach(config, Clearance(config, scenario, hard=hard), braking=braking)
+    stops = StopCheck(config, Clearance(config, scenario, hard=hard), limits=limits, tick_s=tick_s, braking=braking)
+    mover = Mover(config, envelope=envelope, table_m=table_m, tick_s=tick_s, approach=approach)
+    gate = Gate(
+        arm=arm, limits=limits, envelope=envelope, chain=ToolChain(config), when_latched=when_latched, stops=stops
+    )
+    return mover, gate
 
 
 class TickLoop:
@@ -52,6 +84,7 @@ class TickLoop:
         scenario: Scenario,
         rule_sets: tuple[RuleSet, ...],
         rig: Rig,
+        profile: Profile,
         when_latched: Callable[[Verdict], object] | None = None,
     ) -> None:
         """Put the parts together; the arm is not connected to.
@@ -59,22 +92,24 @@ class TickLoop:
         Args:
             arm: what is driven.
             config: the arm's file.
+            profile: what of it may be used.
             scenario: the table.
             rule_sets: one for each span of the scenario's schedule.
             rig: how long a tick is.
             when_latched: told of a refusal before the arm is stopped for it.
 
         Raises:
-            RobotConfigError: the arm's tick is another.
+            RobotConfigError: the arm's tick is another, or the profile allows more than the arm can do.
         """
         if abs(arm.spec.rate_hz * rig.tick_s - 1.0) > WHOLE_TICKS:
             raise RobotConfigError(f"rig {rig.name}: tick {rig.tick_s} s, the plant's is {1 / arm.spec.rate_hz} s")
-        table_m = scenario.table.height_m
         self._arm = arm
+        check_profile_fits(profile, arm.spec)
+        config = limited(config, profile)
         self._cell = Cell(scenario=scenario, rule_sets=rule_sets, arm=config)
-        self._mover = Mover(config, table_m=table_m, tick_s=rig.tick_s)
-        limits = GateLimits.of(config, arm.spec, table_m=table_m, tick_s=rig.tick_s)
-        self._gate = Gate(arm=arm, limits=limits, chain=ToolChain(config), when_latched=when_latched)
+        self._mover, self._gate = guarded(
+            arm=arm, config=config, scenario=scenario, rig=rig, profile=profile, when_latched=when_latched
+        )
         self._tick_s, self._tick_ns = rig.tick_s, round(rig.tick_s * 1e9)
         self.state: ArmState
         self._read_ns = self._epoch = 0
@@ -84,6 +119,11 @@ class TickLoop:
     def is_in_contact(self) -> bool:
         """Whether something holds the tool up."""
         return self._mover.is_in_contact
+
+    @property
+    def gate(self) -> Gate:
+        """The last say, for whoever checks it past all shaping."""
+        return self._gate
 
     @property
     def why_lost(self) -> str | None:
@@ -200,7 +240,7 @@ class TickLoop:
         mover, before, self._before = self._mover, self._before, self.state
         return Stride(
             before=before, after=self.state, is_begun=is_begun, target_m=mover.target_m, limiters=mover.limiters,
-            is_in_contact=mover.is_in_contact, verdict=verdict,
+            limited=mover.limited, is_in_contact=mover.is_in_contact, verdict=verdict,
         )  # fmt: skip
 
 

@@ -166,7 +166,12 @@ class Blocks:
         self._listener = _Listener(arm.clock, self._take)
         arm.clock = self._listener
         self._loop = TickLoop(
-            arm=arm, config=resolved.arm, scenario=resolved.scenario, rule_sets=resolved.rule_sets, rig=resolved.rig
+            arm=arm,
+            config=resolved.arm,
+            scenario=resolved.scenario,
+            rule_sets=resolved.rule_sets,
+            rig=resolved.rig,
+            profile=resolved.profile,
         )
 
     def _go_round(self, duration_s: float) -> bool:

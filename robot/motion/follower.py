@@ -3,9 +3,11 @@
 import math
 
 from config.arm import ArmConfig
+from robot.envelope import Envelope
 from robot.geometry import turn_about_vertical, unwound
 from robot.kinematics import Kinematics, UnreachableError
 from robot.messages import Vec3, Vec6
+from robot.motion.holding import share_of_step, slid
 from robot.motion.limiter import AxisLimits, Limiter
 
 __all__ = ["Follower"]
@@ -33,13 +35,17 @@ class Follower:
 
     Attributes:
         q_rad: Joints of the last tick.
+        q_before_rad: Those of the tick before.
         target_m: Where the tool centre point will rest.
         yaw_rad: Turn at which it will rest.
         trouble: What went wrong in the last tick, if anything: the joints brake.
+        held: What held the last tick back and by which share of its step, if anything did.
     """
 
-    def __init__(self, arm: ArmConfig, *, tick_s: float) -> None:
+    def __init__(self, arm: ArmConfig, *, envelope: Envelope, tick_s: float) -> None:
         motion, joints = arm.motion, arm.joints
+        self._envelope = envelope
+        self._fence_names = {fence.name for fence in envelope.fences}
         self._is_swift = tick_s < SWIFT_TICK_S
         self._kinematics = Kinematics(arm, is_swift=self._is_swift)
         self._home_yaw_rad = arm.tool_yaw_rad
@@ -65,8 +71,11 @@ class Follower:
 
     def seed(self, q_rad: Vec6) -> None:
         """Rest at these joints; everything before is forgotten."""
-        self.q_rad = self._q_before_rad = q_rad
+        self.q_rad = self.q_before_rad = q_rad
         self.trouble: str | None = None
+        self.held: tuple[str, float] | None = None
+        self._is_fenced = False
+        self._points = self._kinematics.chain.points(q_rad)
         self.target_m = self._kinematics.tcp(q_rad)
         self.yaw_rad = self._home_yaw_rad
         self._is_upright = self._is_solved = False
@@ -77,6 +86,10 @@ class Follower:
     def tcp(self, q_rad: Vec6) -> Vec3:
         """Return the tool centre point for joint angles, base frame, metres."""
         return self._kinematics.tcp(q_rad)
+
+    def points(self, q_rad: Vec6) -> tuple[tuple[Vec3, Vec3, Vec3], float]:
+        """Return tool centre point, flange and elbow, and how far the tool points down (kinematics.ToolChain)."""
+        return self._kinematics.chain.points(q_rad)
 
     def tcp_and_lowest(self, q_rad: Vec6) -> tuple[Vec3, float]:
         """Return the tool centre point and the height of the lowest fingertip, base frame, metres."""
@@ -113,14 +126,28 @@ class Follower:
         self._joints.aim(list(q_rad))
         self.target_m = self._kinematics.tcp(q_rad)
 
-    def joints_at(self, place_m: Vec3) -> Vec6 | None:
-        """Return joints near the present ones that bring the tool to a place; None where none do, or it is tilted."""
+    def joints_at(self, place_m: Vec3, yaw_rad: float | None = None, seed_rad: Vec6 | None = None) -> Vec6 | None:
+        """Return joints near the present ones that bring the tool to a place; None where none do, or it is tilted.
+
+        Args:
+            place_m: where the tool centre point would be.
+            yaw_rad: its turn; the one at which it will rest where absent.
+            seed_rad: neighbours of the answer; the present joints where absent.
+        """
         if not self._is_upright:
             return None
         try:
-            return self._kinematics.solve(place_m, self.q_rad, yaw_rad=self.yaw_rad)
+            yaw = self.yaw_rad if yaw_rad is None else yaw_rad
+            return self._kinematics.solve(place_m, self.q_rad if seed_rad is None else seed_rad, yaw_rad=yaw)
         except UnreachableError:
             return None
+
+    def let_go(self) -> None:
+        """Where a fence holds the tool up, want no more than where it is: no way back begins behind the fence."""
+        if self._is_fenced and self._is_upright:
+            x, y, z, _ = self._tool.at
+            self.target_m = x, y, z
+        self._is_fenced = False
 
     def brake(self) -> None:
         """Come to rest as soon as the limits allow."""
@@ -133,22 +160,25 @@ class Follower:
 
     def step(self) -> Vec6:
         """Advance by one tick and return the joints to command."""
-        self.trouble = None
+        self.trouble = self.held = None
         q = self._step_tool() if self._is_upright else _vec6(self._joints.step())
+        if q != self.q_rad:
+            q = self._hold_back(q)
         if self._tool.is_failed or self._joints.is_failed:
             self.trouble = "brake"
-        self._q_before_rad, self.q_rad = self.q_rad, q
+        self.q_before_rad, self.q_rad = self.q_rad, q
         return q
 
     def _step_tool(self) -> Vec6:
         if self._to_come is not None:
             self._take_target(self._to_come)
-        before, now = self._tool.at, self._tool.step()
+        before = self._tool.at
+        now = self._slide(before, self._tool.step())
         if now == before and self._is_solved:
             return self.q_rad  # at rest: solving again would stir the last digits
         self._is_solved = True
         x, y, z, yaw = now
-        ahead = _between(self._q_before_rad, self.q_rad, 2.0)
+        ahead = _between(self.q_before_rad, self.q_rad, 2.0)
         try:
             q = self._kinematics.solve((x, y, z), ahead, yaw_rad=yaw)
         except UnreachableError:
@@ -156,7 +186,7 @@ class Follower:
             self.brake()
             self.trouble = "unreachable"
             return _vec6(self._joints.step())
-        return self._slow(q)
+        return q
 
     def _take_target(self, target: list[float]) -> None:
         if self._is_due:
@@ -164,18 +194,46 @@ class Follower:
             self._to_come = None
         self._is_due = True
 
-    def _slow(self, q: Vec6) -> Vec6:
-        """Hold the tool back where a joint would be too fast, as near the base; it goes on at the speed it was let."""
-        excess = max([abs(a - b) / most for a, b, most in zip(q, self.q_rad, self._joint_step_rad, strict=True)])
-        if excess <= 1.0:
-            return q
-        share = 1.0 / excess
-        slowed = _between(self.q_rad, q, share)
-        target, speed = self._tool.target, [v * share for v in self._tool.speed]
-        yaw = turn_about_vertical(self._kinematics.chain.quat(slowed))
-        self._tool.seed([*self._kinematics.tcp(slowed), unwound(yaw, target[3])], speed)
+    def _slide(self, before: list[float], now: list[float]) -> list[float]:
+        """Lead the tool along a fence that it would come too near too fast."""
+        x, y, z, yaw = now
+        (sx, sy, sz), name = slid((before[0], before[1], before[2]), (x, y, z), self._envelope)
+        if not name:
+            return now
+        self.held = name, math.dist((sx, sy, sz), (x, y, z)) / math.dist((x, y, z), before[:3])
+        self._is_fenced = True
+        dt, target, speed = self._tick_s, self._tool.target, self._tool.speed
+        speed = [speed[0] + (sx - x) / dt, speed[1] + (sy - y) / dt, speed[2] + (sz - z) / dt, speed[3]]
+        self._tool.seed([sx, sy, sz, yaw], speed)
         self._tool.aim(target)
-        return slowed
+        return self._tool.at
+
+    def _hold_back(self, q: Vec6) -> Vec6:
+        """Hold a step back where a joint or a part would be too fast for what is ahead; go on at the speed left."""
+        chain, now = self._kinematics.chain, self.q_rad
+        points = chain.points(q)
+        share, name = share_of_step(now, self.q_before_rad, q, self._points, points, self._envelope)
+        if self._is_upright:  # joint limiters keep to their own greatest speed
+            excess = max([abs(a - b) / most for a, b, most in zip(q, now, self._joint_step_rad, strict=True)])
+            if excess > 1.0 and 1.0 / excess <= share:
+                share, name = 1.0 / excess, "joint_speed"
+        if not name:
+            self._points = points
+            return q
+        self.held = name, 1.0 - share
+        self._is_fenced = self._is_fenced or name in self._fence_names
+        q = _between(now, q, share)
+        self._points = chain.points(q)
+        if self._is_upright:
+            target, speed = self._tool.target, [v * share for v in self._tool.speed]
+            yaw = turn_about_vertical(chain.quat(q))
+            self._tool.seed([*self._points[0][0], unwound(yaw, target[3])], speed)
+            self._tool.aim(target)
+        else:
+            target, speed = self._joints.target, [v * share for v in self._joints.speed]
+            self._joints.seed(list(q), speed)
+            self._joints.aim(target)
+        return q
 
     def _take_up_tool(self) -> None:
         """Go on by the tool's coordinates, if it points down and the joints are at rest."""
@@ -189,7 +247,7 @@ class Follower:
         if abs(yaw - self._home_yaw_rad) < ALIGN_RAD:
             yaw = self._home_yaw_rad
         self._is_upright, self._to_come = True, None
-        self._q_before_rad = self.q_rad
+        self.q_before_rad = self.q_rad
         self.target_m, self.yaw_rad = self._kinematics.tcp(self.q_rad), yaw
         self._tool.seed([*self.target_m, yaw])
         self._is_solved = False
@@ -197,7 +255,7 @@ class Follower:
     def _take_up_joints(self) -> None:
         """Go on by the joints, from where they are and as fast as they go."""
         self._is_upright = False
-        speed = [(a - b) / self._tick_s for a, b in zip(self.q_rad, self._q_before_rad, strict=True)]
+        speed = [(a - b) / self._tick_s for a, b in zip(self.q_rad, self.q_before_rad, strict=True)]
         self._joints.seed(list(self.q_rad), speed)
 
     def _align(self, target_m: Vec3, yaw_rad: float) -> bool:

@@ -4,10 +4,13 @@ import math
 from collections.abc import Sequence
 
 from config.arm import ArmConfig
+from robot.envelope import Envelope
 from robot.geometry import inside_box
-from robot.messages import ArmState, Heading, Intent, JointTarget, Twist, Vec3, Vec6
+from robot.messages import ArmState, Heading, Intent, JointTarget, Limited, Twist, Vec3, Vec6
+from robot.motion.approach import Approach
 from robot.motion.contact import ContactGuard
 from robot.motion.follower import Follower
+from robot.motion.holding import MARGIN_M, MARGIN_RAD, share_of_giving_way
 from robot.motion.target import (
     MAX_TURN_RAD,
     Shaped,
@@ -27,6 +30,8 @@ FENCE_MARGIN_M = 1e-4
 """How far inside a fence a command comes to rest that a push would carry past it."""
 STRAY_M = 0.03
 """A tool this far from where its commands should have brought it is held up: the leash is held at the tool then."""
+N_HALVINGS = 8
+"""How finely a joint target that lies beyond a fence is brought back to it."""
 RESEAT_SHARE = 0.9
 """Share of a joint's greatest speed at which commands fall back to the measured joints on contact."""
 
@@ -34,14 +39,27 @@ RESEAT_SHARE = 0.9
 class Mover:
     """Carries the target from intent to intent. `seed` forgets everything before."""
 
-    def __init__(self, arm: ArmConfig, *, table_m: float, tick_s: float) -> None:
+    def __init__(
+        self, arm: ArmConfig, *, envelope: Envelope, table_m: float, tick_s: float, approach: Approach | None = None
+    ) -> None:
+        """Put the parts together.
+
+        Args:
+            arm: the arm's file.
+            envelope: what of the limits profile is held besides.
+            table_m: height of the table's top, base frame.
+            tick_s: how long a tick is.
+            approach: what keeps targets clear of bodies and singular postures; None where there are none.
+        """
+        self._approach = approach
         self._limits = TargetLimits.of(arm, table_m)
-        self._follower = Follower(arm, tick_s=tick_s)
+        self._follower = Follower(arm, envelope=envelope, tick_s=tick_s)
+        self._envelope = envelope
         self._contact = ContactGuard(arm)
         self._trail = Trail(arm.servo, tick_s=tick_s, q_rad=self._follower.q_rad)
         self._ranges = tuple(j.range_rad for j in arm.joints)
         self._fall_back_rad = tuple(RESEAT_SHARE * j.speed_rad_s * tick_s for j in arm.joints)
-        self._limiters: list[str] = []
+        self._amounts: dict[str, float] = {}
 
     @property
     def target_m(self) -> Vec3:
@@ -51,7 +69,12 @@ class Mover:
     @property
     def limiters(self) -> tuple[str, ...]:
         """What shortened or changed the present step so far, in order, each once."""
-        return tuple(dict.fromkeys(self._limiters))
+        return tuple(self._amounts)
+
+    @property
+    def limited(self) -> tuple[Limited, ...]:
+        """The same, each with by how much."""
+        return tuple(Limited(name=name, amount=amount) for name, amount in self._amounts.items())
 
     @property
     def is_in_contact(self) -> bool:
@@ -63,11 +86,12 @@ class Mover:
         self._follower.seed(state.q_rad)
         self._trail.seed(state.q_rad)
         self._contact.reset()
-        self._limiters = []
+        self._amounts = {}
 
     def begin_step(self, intent: Intent, state: ArmState, *, duration_s: float) -> None:
         """Move the target as an intent asks for one time step. The gate has admitted the intent."""
-        self._limiters = []
+        self._amounts = {}
+        self._follower.let_go()
         at, yaw = self._follower.target_m, self._follower.yaw_rad
         if isinstance(intent, Heading):
             self._follow(advance_heading(at, intent, self._limits, duration_s), yaw, state)
@@ -85,7 +109,7 @@ class Mover:
 
         A tool that is not upright rests where it can.
         """
-        self._limiters = ["hand"]
+        self._amounts = {"hand": 0.0}
         self._follower.brake()
         if self._follower.is_upright:
             shaped = Shaped((place_m[0], place_m[1], self._follower.target_m[2]))
@@ -93,7 +117,7 @@ class Mover:
 
     def hold(self, because: str) -> None:
         """Come to rest in place of what an intent asks."""
-        self._limiters = [because]
+        self._amounts = {because: 0.0}
         self._follower.brake()
 
     def tick(self, state: ArmState) -> Vec6:
@@ -107,32 +131,42 @@ class Mover:
             commanded_m = follower.tcp(follower.q_rad)
             moved = self._contact.reseat(state.tcp_force_n, state.tcp_position_m, commanded_m, follower.target_m)
             if moved is not None:
-                self._limiters.append("contact")
+                self._note("contact")
                 return self._give_way(moved, state)
         q = follower.step()
         self._trail.add(q)
         if follower.trouble is not None:
-            self._limiters.append(follower.trouble)
+            self._note(follower.trouble)
+        if follower.held is not None:
+            self._note(*follower.held)
         return q
+
+    def _note(self, name: str, amount: float = 0.0) -> None:
+        """Write down what changed the step, and by how much at most."""
+        self._amounts[name] = max(self._amounts.get(name, 0.0), amount)
 
     def _give_way(self, target_m: Vec3, state: ArmState) -> Vec6:
         """Fall back to the measured joints and aim at a target, but never let a push carry the command past a fence."""
         follower = self._follower
         yaw, back = follower.yaw_rad, self._back_to(state.q_rad)
         if not self._is_inside(back):
-            back = self._back_inside(state.tcp_position_m)
+            back = self._back_inside(state)
+        change = [b - a for a, b in zip(follower.q_rad, back, strict=True)]
+        share = share_of_giving_way(follower.q_rad, follower.q_before_rad, back, state.q_rad, self._envelope)
+        if share < 1.0:
+            back = _along(follower.q_rad, change, share)
         follower.seed(back)
         self._trail.seed(back)
-        follower.aim(fence(target_m, state.tcp_position_m, self._limits).position_m, yaw)
+        follower.aim(self._clear(fence(target_m, state.tcp_position_m, self._limits).position_m, yaw), yaw)
         return back
 
-    def _back_inside(self, measured_m: Vec3) -> Vec6:
+    def _back_inside(self, state: ArmState) -> Vec6:
         """Return the command brought back to where the tool is, but for a fence that it was pushed past.
 
         A command that stayed where it was would go on pressing: at a fence the tool stood on a lid for good.
         """
         (x0, y0, z0), (x1, y1, z1) = self._limits.workspace_m
-        (x, y, z), m = measured_m, FENCE_MARGIN_M
+        (x, y, z), m = state.tcp_position_m, FENCE_MARGIN_M
         wanted = self._follower.joints_at(
             (min(max(x, x0 + m), x1 - m), min(max(y, y0 + m), y1 - m), min(max(z, z0 + m), z1 - m))
         )
@@ -140,17 +174,44 @@ class Mover:
         return back if self._is_inside(back) else self._follower.q_rad
 
     def _is_inside(self, q_rad: Vec6) -> bool:
-        return inside_box(self._follower.tcp(q_rad), *self._limits.workspace_m)
+        return inside_box(self._follower.tcp(q_rad), *self._limits.workspace_m) and self._beyond(q_rad) is None
 
     def _follow(self, shaped: Shaped, yaw_rad: float, state: ArmState) -> None:
-        self._limiters.extend(shaped.limiters)
+        for name in shaped.limiters:
+            self._note(name, shaped.amount_m)
         eased, is_eased = self._contact.ease(self._follower.target_m, shaped.position_m)
         if is_eased:
-            self._limiters.append("contact")
+            self._note("contact", math.dist(eased, shaped.position_m))
         fenced = self._fenced(eased, state)
-        self._limiters.extend(fenced.limiters)
-        if not self._follower.aim(fenced.position_m, yaw_rad):
-            self._limiters.append("unreachable")
+        for name in fenced.limiters:
+            self._note(name, math.dist(fenced.position_m, eased))
+        place_m = self._clear(fenced.position_m, yaw_rad)
+        tilted_rad = None if self._follower.is_upright else self._follower.joint_target_rad
+        if not self._follower.aim(place_m, yaw_rad):
+            self._note("unreachable")
+        elif tilted_rad is not None and not self._follower.is_upright:
+            self._aim_clear(tilted_rad, self._follower.joint_target_rad)
+
+    def _clear(self, target_m: Vec3, yaw_rad: float) -> Vec3:
+        """Keep the target of an upright tool from leading into bodies and singular postures."""
+        follower, approach = self._follower, self._approach
+        if approach is None or not follower.is_upright:
+            return target_m
+        at_m = follower.target_m
+        place_m, because = approach.clear_place(
+            at_m, target_m, now_rad=follower.q_rad, joints_at=lambda p, seed: follower.joints_at(p, yaw_rad, seed)
+        )
+        if because is not None:
+            self._note(because, math.dist(place_m, target_m))
+        return place_m
+
+    def _aim_clear(self, now: Vec6, wanted: Vec6) -> None:
+        """Aim at joints, as far as the way there is clear of bodies."""
+        if self._approach is not None:
+            asked, (wanted, because) = wanted, self._approach.clear_joints(now, wanted)
+            if because is not None:
+                self._note(because, max(abs(a - b) for a, b in zip(asked, wanted, strict=True)))
+        self._follower.aim_joints(wanted)
 
     def _aim_joints(self, wanted_rad: Vec6, state: ArmState, duration_s: float) -> None:
         """Move the joint target towards given joints, the tool by no more than a step and inside the fences."""
@@ -158,7 +219,7 @@ class Mover:
         now = follower.joint_target_rad
         inside = [min(max(v, low), high) for v, (low, high) in zip(wanted_rad, self._ranges, strict=True)]
         if any(a != b for a, b in zip(inside, wanted_rad, strict=True)):
-            self._limiters.append("joint_range")
+            self._note("joint_range", max(abs(a - b) for a, b in zip(inside, wanted_rad, strict=True)))
         here = follower.tcp(now)
         longest = limits.max_step_m if here[2] > limits.guard_z_m else limits.guarded_speed_m_s * duration_s
         change = [b - a for a, b in zip(now, inside, strict=True)]
@@ -171,19 +232,60 @@ class Mover:
             share *= 0.999 * longest / moved
             q = _along(now, change, share)
         if share < 1.0:
-            self._limiters.append("max_step")
+            self._note("max_step", 1.0 - share)
         tcp, lowest_m = follower.tcp_and_lowest(q)
         fenced = self._fenced(tcp, state)
         if fenced.limiters or lowest_m < limits.tip_min_m:
-            self._limiters.extend(fenced.limiters or ("table",))
+            for name in fenced.limiters or ("table",):
+                self._note(name, math.dist(fenced.position_m, tcp))
             return
-        follower.aim_joints(q)
+        self._aim_inside(now, q)
+
+    def _aim_inside(self, now: Vec6, q: Vec6) -> None:
+        """Aim at joints, or as near them as every part is inside of its fences and the tool inside of its cone."""
+        beyond = self._beyond(q)
+        if beyond is None:
+            self._aim_clear(now, q)
+            return
+        self._note(*beyond)
+        change, share, width = [b - a for a, b in zip(now, q, strict=True)], 0.0, 0.5
+        for _ in range(N_HALVINGS):
+            if self._beyond(_along(now, change, share + width)) is None:
+                share += width
+            width /= 2
+        if share > 0.0:
+            self._aim_clear(now, _along(now, change, share))
+
+    def _beyond(self, q_rad: Vec6) -> tuple[str, float] | None:
+        """Return which fence or cone joints would be beyond and by how much, None where all is inside."""
+        points, down = self._follower.points(q_rad)
+        for gap_of in self._envelope.fences:
+            gap = gap_of.gap(points[gap_of.part]) - MARGIN_M
+            if gap < 0.0:
+                return gap_of.name, -gap
+        over = self._envelope.cone_rad - MARGIN_RAD
+        if over < math.pi and down < math.cos(over):
+            return "tool_cone", math.cos(over) - down
+        return None
 
     def _fenced(self, target_m: Vec3, state: ArmState) -> Shaped:
         """Keep a target inside the workspace and on the leash; where that is held is found only if it matters."""
-        if is_free(target_m, state.tcp_position_m, self._limits, stray_m=STRAY_M):
+        out_m, name = self._led_out(target_m)
+        if not name and is_free(target_m, state.tcp_position_m, self._limits, stray_m=STRAY_M):
             return Shaped(target_m)
-        return fence(target_m, self._leashed_to_m(state), self._limits)
+        fenced = fence(out_m, self._leashed_to_m(state), self._limits)
+        return Shaped(fenced.position_m, (name, *fenced.limiters)) if name else fenced
+
+    def _led_out(self, target_m: Vec3) -> tuple[Vec3, str]:
+        """Return the nearest place that planes and volumes leave to the tool, and the name of what moved it last."""
+        name = ""
+        for gap_of in self._envelope.fences:
+            gap = 0.0 if gap_of.part else gap_of.gap(target_m) - MARGIN_M
+            if gap < 0.0:
+                nx, ny, nz = gap_of.away(target_m)
+                x, y, z = target_m
+                target_m, name = (x - gap * nx, y - gap * ny, z - gap * nz), gap_of.name
+        return target_m, name
 
     def _leashed_to_m(self, state: ArmState) -> Vec3:
         """Return where the leash is held: where a free tool is by now, or at the tool where something keeps it away."""

@@ -57,6 +57,8 @@ class Shaped(msgspec.Struct, frozen=True):
 
     position_m: Vec3
     limiters: tuple[str, ...] = ()
+    amount_m: float = 0.0
+    """How much longer the way would have been that was asked for, or how far away the height."""
 
 
 def advance_heading(at_m: Vec3, intent: Heading, limits: TargetLimits, duration_s: float) -> Shaped:
@@ -66,6 +68,7 @@ def advance_heading(at_m: Vec3, intent: Heading, limits: TargetLimits, duration_
     """
     names: list[str] = []
     distance = intent.distance_m
+    asked = math.hypot(distance, limits.table_m + intent.height_m - at_m[2])
     longest = limits.max_step_m
     if distance > longest + _TINY:
         distance = longest
@@ -80,7 +83,7 @@ def advance_heading(at_m: Vec3, intent: Heading, limits: TargetLimits, duration_
         distance *= longest / length
         rise *= longest / length
     step = (distance * math.cos(intent.heading_rad), distance * math.sin(intent.heading_rad), rise)
-    return _move(at_m, step, limits, duration_s, names)
+    return _move(at_m, step, limits, duration_s, names, asked)
 
 
 def advance_twist(at_m: Vec3, intent: Twist, limits: TargetLimits, duration_s: float) -> Shaped:
@@ -94,7 +97,7 @@ def advance_twist(at_m: Vec3, intent: Twist, limits: TargetLimits, duration_s: f
         names.append("max_step")
     if intent.angular_rad_s[0] or intent.angular_rad_s[1]:
         names.append("tool_down")
-    return _move(at_m, (x, y, z), limits, duration_s, names)
+    return _move(at_m, (x, y, z), limits, duration_s, names, length)
 
 
 def guard(at_m: Vec3, step_m: Vec3, limits: TargetLimits, duration_s: float) -> tuple[Vec3, bool]:
@@ -156,8 +159,11 @@ def is_free(target_m: Vec3, tool_m: Vec3, limits: TargetLimits, *, stray_m: floa
     return is_near and inside_box(target_m, *limits.workspace_m)
 
 
-def _move(at_m: Vec3, step_m: Vec3, limits: TargetLimits, duration_s: float, names: list[str]) -> Shaped:
+def _move(
+    at_m: Vec3, step_m: Vec3, limits: TargetLimits, duration_s: float, names: list[str], asked_m: float
+) -> Shaped:
     (x, y, z), is_slowed = guard(at_m, step_m, limits, duration_s)
     if is_slowed:
         names.append("guard")
-    return Shaped((at_m[0] + x, at_m[1] + y, at_m[2] + z), tuple(names))
+    amount_m = max(0.0, asked_m - math.hypot(x, y, z)) if names else 0.0
+    return Shaped((at_m[0] + x, at_m[1] + y, at_m[2] + z), tuple(names), amount_m)

@@ -60,12 +60,20 @@ class Reason(StrEnum):
     ARM_MODE = "arm_mode"
     JOINT_RANGE = "joint_range"
     JOINT_SPEED = "joint_speed"
+    SOFT_MARGIN = "soft_margin"
+    JOINT_ACCELERATION = "joint_acceleration"
+    PART_SPEED = "part_speed"
+    FENCE = "fence"
+    CONE = "cone"
     WORKSPACE = "workspace"
     TABLE = "table"
     TRACKING = "tracking"
     FORCE = "force"
     GRIP = "grip"
     OUTPUTS = "outputs"
+    CLEARANCE = "clearance"
+    STOP_RANGE = "stop_range"
+    STOP_WORKSPACE = "stop_workspace"
 
 
 class Refusal(msgspec.Struct, frozen=True):

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable
 
+from robot.envelope import Envelope
 from robot.hal.protocols import Arm
 from robot.kinematics import ToolChain
 from robot.messages import ArmCommand, ArmState, Outcome, Vec6, Verdict
@@ -22,9 +23,19 @@ from robot.safety.checks import (
     check_tool,
     check_tracking,
 )
+from robot.safety.checks_profile import (
+    check_cone,
+    check_fences,
+    check_joint_acceleration,
+    check_part_speeds,
+    check_soft_margin,
+)
 from robot.safety.limits import GateLimits
+from robot.safety.stop_check import StopCheck
 
 __all__ = ["Gate"]
+
+AT_ZERO: Vec6 = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 class Gate:
@@ -39,22 +50,27 @@ class Gate:
         *,
         arm: Arm,
         limits: GateLimits,
+        envelope: Envelope,
         chain: ToolChain,
         when_latched: Callable[[Verdict], object] | None = None,
+        stops: StopCheck | None = None,
     ) -> None:
         """Store.
 
         Args:
             arm: the only thing that is written to.
             limits: what is held.
+            envelope: what of the limits profile is held besides.
             chain: where the tool is for given joints.
             when_latched: told of the refusal that latches, before the arm is stopped: a stop takes its time.
+            stops: what verifies the stop that would follow each command; None where bodies are no matter.
         """
-        self._arm, self._limits, self._chain = arm, limits, chain
-        self._when_latched = when_latched
+        self._arm, self._limits, self._envelope, self._chain = arm, limits, envelope, chain
+        self._when_latched, self._stops = when_latched, stops
         self._sequence = 0
         self._force_before_n = 0.0
-        self._q_rad: Vec6 = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+        self._q_rad = self._q_before_rad = AT_ZERO
+        self._points = chain.points(AT_ZERO)[0]
         self._intent_ns = 0
         self._latched: Refusal | None = None
         self._is_stop_confirmed = True
@@ -81,11 +97,14 @@ class Gate:
 
     def seed(self, state: ArmState) -> None:
         """Start from the measured joints at rest, latch cleared. For the station, after arming or a reset only."""
-        self._q_rad = state.q_rad
+        self._q_rad = self._q_before_rad = state.q_rad
+        self._points = self._chain.points(state.q_rad)[0]
         self._sequence = 0
         self._force_before_n = 0.0
         self._intent_ns = state.stamp_ns
         self._latched = None
+        if self._stops is not None:
+            self._stops.seed()
 
     def admit(self, intent: object, *, now_ns: int) -> Verdict | None:
         """Take note of a fresh intent. A wrong one is refused and latches; None means admitted."""
@@ -100,7 +119,7 @@ class Gate:
         refusal = self._latched or self._check(command, state, now_ns)
         if refusal is not None:
             return self._refuse(refusal, stamp_ns=now_ns)
-        self._q_rad = command.q_rad
+        self._q_before_rad, self._q_rad = self._q_rad, command.q_rad
         self._sequence = command.sequence
         self._arm.write(command)
         return None
@@ -131,8 +150,24 @@ class Gate:
                 or check_joint_speed(q, self._q_rad, limits)
                 or check_tool(q, self._chain, limits)
                 or check_intent_age(self._intent_ns, now_ns, limits)
+                or self._check_envelope(q, state.q_rad)
+                or (None if self._stops is None else self._stops.check(q, self._q_rad, state))
             )
         return refusal or check_tracking(q, state.q_rad, limits)
+
+    def _check_envelope(self, q_rad: Vec6, measured_rad: Vec6) -> Refusal | None:
+        """Run the checks of the limits profile on joints that are in range and no faster than they may be."""
+        envelope, last_rad = self._envelope, self._q_rad
+        points, down = self._chain.points(q_rad)
+        refusal = (
+            check_soft_margin(q_rad, last_rad, envelope)
+            or check_joint_acceleration(q_rad, last_rad, self._q_before_rad, measured_rad, envelope)
+            or check_fences(points, envelope)
+            or check_cone(down, envelope)
+            or check_part_speeds(points, self._points, lambda: self._chain.points(measured_rad)[0], envelope)
+        )
+        self._points = points
+        return refusal
 
     def _refuse(self, refusal: Refusal, *, stamp_ns: int) -> Verdict:
         is_new = self._latched is None

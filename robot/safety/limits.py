@@ -3,16 +3,19 @@
 import msgspec
 
 from config.arm import ArmConfig
+from config.limits import Profile
 from robot.errors import RobotConfigError
 from robot.messages import ArmSpec, Box3, Vec6
 
-__all__ = ["GateLimits"]
+__all__ = ["GateLimits", "check_profile_fits"]
 
 BOW_M = 0.01
 """Headings move the tool straight; towards joint targets it bows out, by up to 6 mm on a leash of 9 cm."""
 FLOOR_BOW_M = 0.005
 """Near the table motion is guarded and bows less."""
 SPEED_TOLERANCE = 1e-9
+AGREED = 1e-3
+"""File and arm round their limits differently."""
 
 
 class GateLimits(msgspec.Struct, frozen=True, kw_only=True):
@@ -75,6 +78,28 @@ class GateLimits(msgspec.Struct, frozen=True, kw_only=True):
             state_max_age_ns=round(motion.state_max_age_s * 1e9),
             intent_max_age_ns=round((motion.intent_max_age_s + rest_s) * 1e9),
         )
+
+
+def check_profile_fits(profile: Profile, spec: ArmSpec) -> None:
+    """Check that a profile allows no joint more than the arm says it can do.
+
+    Raises:
+        RobotConfigError: the joint, what the arm says and what the profile gives.
+    """
+    ends = zip(profile.joints, spec.q_min_rad, spec.q_max_rad, spec.qd_max_rad_s, strict=True)
+    for i, (joint, low, high, speed) in enumerate(ends):
+        where = f"limits profile {profile.name}: joints[{i}]"
+        if joint.range_rad[0] < low - AGREED or joint.range_rad[1] > high + AGREED:
+            ours = f"{joint.range_rad[0]:.3f} .. {joint.range_rad[1]:.3f}"
+            raise RobotConfigError(
+                f"{where}.range_rad: expected a range within the arm's own {low:.3f} .. {high:.3f} rad, the file gives "
+                f"{ours}: narrow it there"
+            )
+        if joint.speed_rad_s > speed + AGREED:
+            raise RobotConfigError(
+                f"{where}.speed_rad_s: expected at most the arm's own {speed:.3f} rad/s, the file gives "
+                f"{joint.speed_rad_s:.3f}: lower it there"
+            )
 
 
 def _vec6(x: tuple[float, ...]) -> Vec6:

@@ -1,7 +1,26 @@
-"""A person at the stick: devices become intents, and intents go the way of all others, through motion and gate."""
+"""Who drives by hand, and what is put before a station to see that its limits hold whoever drives."""
 
+from robot.teleop.asks import Arena, Ask, Look, Seen, Send, Silence, Write
+from robot.teleop.battery import Battery, Place, Search
 from robot.teleop.device import Device, DriverInput, Frame
 from robot.teleop.driver import DrivenStation, Driver
 from robot.teleop.jog import Jog
 
-__all__ = ["Device", "DrivenStation", "Driver", "DriverInput", "Frame", "Jog"]
+__all__ = [
+    "Arena",
+    "Ask",
+    "Battery",
+    "Device",
+    "DrivenStation",
+    "Driver",
+    "DriverInput",
+    "Frame",
+    "Jog",
+    "Look",
+    "Place",
+    "Search",
+    "Seen",
+    "Send",
+    "Silence",
+    "Write",
+]

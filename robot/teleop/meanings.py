@@ -15,11 +15,20 @@ MEANINGS = {
     "unreachable": "no joints lead there",
     "joint_range": "a joint is at the end of its range",
     "table": "the fingertips are as low over the table as they may be",
+    "joint_speed": "a joint is as fast as it may be",
+    "joint_acceleration": "a joint gathers speed no faster",
+    "soft_margin": "a joint nears the end of its range, slower",
+    "tcp_speed": "the tool is as fast as the profile lets it",
+    "flange_speed": "the flange is as fast as the profile lets it",
+    "elbow_speed": "the elbow is as fast as the profile lets it",
+    "tool_cone": "the tool may tilt no further",
+    "clearance": "the arm comes near something, slower",
+    "singularity": "the arm nears a place where it loses a direction, slower",
     "no_intent": "nothing came in time, at rest",
     "object_lost": "what the hand held slipped away",
 }
 
 
 def meaning(name: str) -> str:
-    """Return what a limiter's name means; of one that is not in the table, its own name in words."""
-    return MEANINGS.get(name, name.replace("_", " "))
+    """Return what a limiter's name means; any other is a fence's, which its limits file gave it."""
+    return MEANINGS.get(name, "at the fence of that name in the limits file")

@@ -127,7 +127,7 @@ def _limits(view: DriveView) -> Text:
     if view.result is None or not view.result.executed.limiters:
         return Text("none", style="dim")
     names = view.result.executed.limiters
-    amounts = {v.reason: v.amount for v in view.result.verdicts if v.amount}
+    amounts = {limited.name: limited.amount for limited in view.result.executed.limited if limited.amount}
     kept = kept_share(view.sent, view.result.executed.moved_m, view.step_s)
     share = "" if kept is None or view.gain < 1.0 else f"  (the tool goes at {kept:.0%} of what was asked)"
     told = [f"{name}{f' {amounts[name]:.3g}' if name in amounts else ''}: {meaning(name)}" for name in names]

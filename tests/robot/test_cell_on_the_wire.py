@@ -149,7 +149,12 @@ def test_the_cell_program_sees_the_button_and_drives_lamp_and_lid_through_these_
     resolved = resolve(rig=folder / "rig.yaml", scenario=folder / "small.yaml")
     plant = RtdePlant(arm=resolved.arm, scenario=resolved.scenario, rig=resolved.rig, cell=resolved.cell)
     loop = TickLoop(
-        arm=plant.arm, config=resolved.arm, scenario=resolved.scenario, rule_sets=resolved.rule_sets, rig=resolved.rig
+        arm=plant.arm,
+        config=resolved.arm,
+        scenario=resolved.scenario,
+        rule_sets=resolved.rule_sets,
+        rig=resolved.rig,
+        profile=resolved.profile,
     )
     with VirtualSomebody(resolved.rig.bus, SERIAL) as hand:
         try:

@@ -8,6 +8,7 @@ from config.loader import load_arm
 from robot.description import forward_kinematics, tool_down
 from robot.kinematics import Kinematics
 from robot.motion.follower import Follower
+from tests.support.profiles import envelope, open_envelope
 
 ARM = load_arm("ur5e")
 DT, FAST_DT = 0.01, 0.002
@@ -19,7 +20,7 @@ LOW, HIGH = (np.array(corner) for corner in ARM.motion.workspace_m)
 
 @pytest.fixture
 def follower():
-    made = Follower(ARM, tick_s=DT)
+    made = Follower(ARM, envelope=envelope(DT), tick_s=DT)
     made.seed(Q_START)
     return made
 
@@ -53,7 +54,10 @@ def test_the_tool_goes_straight_stays_upright_and_rests_on_the_target(follower):
 
 def test_at_a_real_arms_ticks_the_way_is_the_same_and_begins_one_tick_later():
     rng = np.random.default_rng(1)
-    now, later = Follower(ARM, tick_s=FAST_DT), Follower(ARM, tick_s=FAST_DT)
+    now, later = (
+        Follower(ARM, envelope=envelope(FAST_DT), tick_s=FAST_DT),
+        Follower(ARM, envelope=envelope(FAST_DT), tick_s=FAST_DT),
+    )
     now._is_swift = False
     for follower in (now, later):
         follower.seed(Q_START)
@@ -70,7 +74,7 @@ def test_at_a_real_arms_ticks_the_way_is_the_same_and_begins_one_tick_later():
 
 
 def test_targets_that_come_every_tick_are_gone_to_and_a_brake_waits_for_nothing():
-    follower = Follower(ARM, tick_s=FAST_DT)
+    follower = Follower(ARM, envelope=envelope(FAST_DT), tick_s=FAST_DT)
     follower.seed(Q_START)
     for i in range(200):
         follower.aim((START[0] + 1e-4 * i, *START[1:]), ARM.tool_yaw_rad)
@@ -85,7 +89,7 @@ def test_targets_that_come_every_tick_are_gone_to_and_a_brake_waits_for_nothing(
 
 def test_joints_keep_their_speeds_and_accelerations_over_random_targets():
     rng = np.random.default_rng(0)
-    follower = Follower(ARM, tick_s=DT)
+    follower = Follower(ARM, envelope=envelope(DT), tick_s=DT)
     speed_max, acceleration_max = np.zeros(6), np.zeros(6)
     for _ in range(30):
         follower.seed(KINEMATICS.solve(tuple(rng.uniform(LOW, HIGH).tolist()), ARM.home_rad))
@@ -104,7 +108,7 @@ def test_joints_keep_their_speeds_and_accelerations_over_random_targets():
 
 def test_near_the_base_the_tool_is_held_back_so_that_no_joint_is_too_fast():
     # Here a metre a second of the tool is more than the base joint may do.
-    follower = Follower(ARM, tick_s=DT)
+    follower = Follower(ARM, envelope=open_envelope(DT), tick_s=DT)
     follower.seed(KINEMATICS.solve((0.16, -0.1, 0.25), ARM.home_rad))
     follower.aim((0.16, 0.1, 0.25), ARM.tool_yaw_rad)
     path = run(follower, 150)
@@ -133,7 +137,7 @@ def test_taking_up_joints_in_motion_makes_no_jump(follower):
 
 
 def test_a_tilted_tool_is_brought_upright_in_bounded_steps():
-    follower = Follower(ARM, tick_s=DT)
+    follower = Follower(ARM, envelope=envelope(DT), tick_s=DT)
     tilted = (*Q_START[:4], Q_START[4] + 0.6, Q_START[5])
     follower.seed(tilted)
     path = [tilted]
@@ -146,7 +150,9 @@ def test_a_tilted_tool_is_brought_upright_in_bounded_steps():
     assert tcps(path)[-1] == pytest.approx(START, abs=1e-4)
 
 
-def test_an_unreachable_place_brings_the_arm_to_rest_and_says_so(follower):
+def test_an_unreachable_place_brings_the_arm_to_rest_and_says_so():
+    follower = Follower(ARM, envelope=open_envelope(DT), tick_s=DT)
+    follower.seed(Q_START)
     follower.aim((1.3, 0.0, 0.2), ARM.tool_yaw_rad)
     troubles, path = [], []
     for _ in range(400):
@@ -167,7 +173,7 @@ def test_braking_rests_soon_and_the_target_says_where(follower):
 
 
 def test_seeding_forgets_everything_before(follower):
-    fresh = Follower(ARM, tick_s=DT)
+    fresh = Follower(ARM, envelope=envelope(DT), tick_s=DT)
     follower.aim((0.5, 0.1, 0.3), 0.4)
     run(follower, 33)
     follower.seed(Q_START)

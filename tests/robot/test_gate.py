@@ -11,6 +11,7 @@ from robot.hal.fake import FakeArm
 from robot.kinematics import Kinematics, ToolChain
 from robot.messages import ArmMode, GripCommand, Heading, Outcome
 from robot.safety import Gate, GateLimits, Reason
+from tests.support.profiles import envelope, open_envelope
 from tests.support.stations import TICK_NS, arm_state, command
 
 ARM = load_arm("ur5e")
@@ -40,7 +41,8 @@ def arm():
 @pytest.fixture
 def gate(arm):
     spec = FakeArm(arm=ARM, tick_s=0.01).spec
-    made = Gate(arm=arm, limits=GateLimits.of(ARM, spec, table_m=0.0, tick_s=0.01), chain=CHAIN)
+    limits = GateLimits.of(ARM, spec, table_m=0.0, tick_s=0.01)
+    made = Gate(arm=arm, limits=limits, envelope=open_envelope(), chain=CHAIN)
     made.seed(arm_state(START))
     return made
 
@@ -147,7 +149,7 @@ def test_a_joint_may_come_to_the_end_of_its_range_and_not_past_it(arm, joint):
     wide = replace(ARM, motion=replace(ARM.motion, workspace_m=((-3.0, -3.0, -3.0), (3.0, 3.0, 3.0))))
     limits = replace(GateLimits.of(wide, spec, table_m=-3.0, tick_s=0.01), tip_min_m=-9.0)
     for by, expected in ((0.0, None), (1e-6, Reason.JOINT_RANGE)):
-        gate = Gate(arm=arm, limits=limits, chain=CHAIN)
+        gate = Gate(arm=arm, limits=limits, envelope=open_envelope(), chain=CHAIN)
         start, there = at_its_end(joint, by)
         gate.seed(arm_state(start))
         verdict = gate.write(command(there), arm_state(start), now_ns=0)
@@ -210,7 +212,7 @@ def test_a_refusal_is_told_once_before_the_arm_is_stopped_and_stops_it_whoever_l
 
     spec = FakeArm(arm=ARM, tick_s=0.01).spec
     limits = GateLimits.of(ARM, spec, table_m=0.0, tick_s=0.01)
-    gate = Gate(arm=arm, limits=limits, chain=CHAIN, when_latched=listen)
+    gate = Gate(arm=arm, limits=limits, envelope=envelope(0.01), chain=CHAIN, when_latched=listen)
     gate.seed(arm_state(START))
     if listener_fails:
         with pytest.raises(BrokenPipeError):

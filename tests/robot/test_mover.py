@@ -8,6 +8,7 @@ from robot.kinematics import Kinematics
 from robot.messages import Heading, Hold, JointTarget, Twist
 from robot.motion import Mover
 from robot.servo import lag_s
+from tests.support.profiles import envelope
 from tests.support.stations import arm_state
 
 ARM = load_arm("ur5e")
@@ -22,7 +23,7 @@ class Perfect:
     """An arm that is where it was told, with a force that a test sets."""
 
     def __init__(self):
-        self.mover = Mover(ARM, table_m=0.0, tick_s=DT)
+        self.mover = Mover(ARM, envelope=envelope(DT), table_m=0.0, tick_s=DT)
         self.q, self.force = Q_START, (0.0, 0.0, 0.0)
         self.mover.seed(self.state)
 
@@ -225,7 +226,7 @@ class Following:
     """An arm whose tool trails its commands by a time, on a way that turns back at full speed."""
 
     def __init__(self, *, tick_s, late_s=0.0):
-        self.mover = Mover(ARM, table_m=0.0, tick_s=tick_s)
+        self.mover = Mover(ARM, envelope=envelope(tick_s), table_m=0.0, tick_s=tick_s)
         self.mover.seed(arm_state(Q_START, tcp_m=START))
         servo = ARM.servo
         lag = lag_s(lookahead_s=servo.lookahead_s, gain=servo.gain, dead_time_s=servo.dead_time_s)
@@ -264,7 +265,7 @@ def test_the_leash_bends_no_way_by_how_long_a_tick_is():
 
 @pytest.mark.parametrize("tick_s", [DT, FAST_DT])
 def test_a_tool_that_is_kept_far_from_where_its_commands_lead_is_leashed_where_it_is(tick_s):
-    mover = Mover(ARM, table_m=0.0, tick_s=tick_s)
+    mover = Mover(ARM, envelope=envelope(tick_s), table_m=0.0, tick_s=tick_s)
     mover.seed(arm_state(Q_START, tcp_m=START))
     there = (START[0] + 0.01, START[1] - 0.08, START[2])
     mover.begin_step(go(angle=math.pi / 2), arm_state(KINEMATICS.solve(there, Q_START), tcp_m=there), duration_s=0.05)

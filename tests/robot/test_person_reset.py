@@ -40,7 +40,12 @@ def lab(tmp_path):
     resolved = resolve()
     plant = build_plant(rig=resolved.rig, arm=resolved.arm, scenario=resolved.scenario)
     loop = TickLoop(
-        arm=plant.arm, config=resolved.arm, scenario=resolved.scenario, rule_sets=resolved.rule_sets, rig=resolved.rig
+        arm=plant.arm,
+        config=resolved.arm,
+        scenario=resolved.scenario,
+        rule_sets=resolved.rule_sets,
+        rig=resolved.rig,
+        profile=resolved.profile,
     )
     person = ScriptedPerson(plant, resolved.arm.home_rad)
     resetter = PersonResetter(

@@ -47,7 +47,7 @@ class Served:
         self.ours, theirs = Pipe()
         loop = TickLoop(
             arm=self.plant.arm, config=rig.arm, scenario=rig.scenario, rule_sets=rig.rule_sets, rig=rig.rig,
-            when_latched=lambda verdict: self.server.latched(verdict),
+            profile=rig.profile, when_latched=lambda verdict: self.server.latched(verdict),
         )  # fmt: skip
         self.server = ServoServer(
             connection=theirs,

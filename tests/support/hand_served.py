@@ -44,7 +44,7 @@ class HandServed:
         self._grip = GripCommand(opening_m=tool.stroke_m, force_n=tool.grip_force_n, speed_m_s=tool.speed_m_s[1])
         self.loop = TickLoop(
             arm=plant.arm, config=resolved.arm, scenario=resolved.scenario, rule_sets=resolved.rule_sets,
-            rig=resolved.rig, when_latched=lambda verdict: self.server.latched(verdict),
+            rig=resolved.rig, profile=resolved.profile, when_latched=lambda verdict: self.server.latched(verdict),
         )  # fmt: skip
         self.server = ServoServer(
             connection=theirs, plant=plant, loop=self.loop, arm=resolved.arm, pulse=[0], die=lambda: None,

@@ -1,0 +1,213 @@
+"""A limits profile made ready for the loops that run every tick: fences as gaps, speeds as steps. Pure maths.
+
+Motion slows down by it and the gate refuses by it. Gaps are metres, positive where it is allowed, 0 on the limit.
+"""
+
+import math
+
+import msgspec
+
+from config.arm import ArmConfig
+from config.limits import ArmPart, KeepOut, Plane, Profile
+from robot.messages import Vec3
+
+__all__ = [
+    "SLOWEST_SHARE",
+    "BoxGap",
+    "Envelope",
+    "FenceGap",
+    "JointEnd",
+    "KeepOutGap",
+    "PlaneGap",
+    "braking_step",
+    "soft_step",
+]
+
+PARTS = (ArmPart.TCP, ArmPart.FLANGE, ArmPart.ELBOW)
+"""Order of the points that kinematics.ToolChain.points returns."""
+FAR_M = 0.01
+CONE_NEAR_RAD = 1.0
+SLOWEST_SHARE = 0.1
+"""Share of a joint's greatest speed that is left at its very end."""
+
+
+class BoxGap(msgspec.Struct, frozen=True):
+    """Inside of a box."""
+
+    name: str
+    part: int
+    low_m: Vec3
+    high_m: Vec3
+
+    def gap(self, at_m: Vec3) -> float:
+        """Return how far inside a point is: the distance to the nearest face."""
+        (x, y, z), (x0, y0, z0), (x1, y1, z1) = at_m, self.low_m, self.high_m
+        return min(x - x0, x1 - x, y - y0, y1 - y, z - z0, z1 - z)
+
+    def away(self, at_m: Vec3) -> Vec3:
+        """Return the direction in which the gap grows fastest, of length 1."""
+        return _inwards(at_m, self.low_m, self.high_m)
+
+
+class PlaneGap(msgspec.Struct, frozen=True):
+    """One side of a plane."""
+
+    name: str
+    part: int
+    normal: Vec3
+    """Of length 1, towards the side that is allowed."""
+    offset_m: float
+
+    def gap(self, at_m: Vec3) -> float:
+        """Return the distance to the plane."""
+        (x, y, z), (nx, ny, nz) = at_m, self.normal
+        return nx * x + ny * y + nz * z - self.offset_m
+
+    def away(self, at_m: Vec3) -> Vec3:  # noqa: ARG002 - the same everywhere
+        """Return the direction in which the gap grows fastest, of length 1."""
+        return self.normal
+
+
+class KeepOutGap(msgspec.Struct, frozen=True):
+    """Outside of a box with rounded edges."""
+
+    name: str
+    part: int
+    low_m: Vec3
+    high_m: Vec3
+    radius_m: float
+
+    def gap(self, at_m: Vec3) -> float:
+        """Return the distance to the volume; inside of the box, what it takes to get out."""
+        (x, y, z), (x0, y0, z0), (x1, y1, z1) = at_m, self.low_m, self.high_m
+        dx, dy, dz = x0 - x if x < x0 else x - x1, y0 - y if y < y0 else y - y1, z0 - z if z < z0 else z - z1
+        if dx <= 0.0 and dy <= 0.0 and dz <= 0.0:
+            return -min(x - x0, x1 - x, y - y0, y1 - y, z - z0, z1 - z) - self.radius_m
+        dx, dy, dz = dx if dx > 0.0 else 0.0, dy if dy > 0.0 else 0.0, dz if dz > 0.0 else 0.0
+        return math.sqrt(dx * dx + dy * dy + dz * dz) - self.radius_m
+
+    def away(self, at_m: Vec3) -> Vec3:
+        """Return the direction in which the gap grows fastest, of length 1."""
+        nearest = [min(max(v, a), b) for v, a, b in zip(at_m, self.low_m, self.high_m, strict=True)]
+        length = math.dist(at_m, nearest)
+        if length > 0.0:
+            x, y, z = ((v - n) / length for v, n in zip(at_m, nearest, strict=True))
+            return x, y, z
+        x, y, z = _inwards(at_m, self.low_m, self.high_m)
+        return -x, -y, -z
+
+
+FenceGap = BoxGap | PlaneGap | KeepOutGap
+
+
+class JointEnd(msgspec.Struct, frozen=True):
+    """What bounds one joint."""
+
+    low_rad: float
+    high_rad: float
+    margin_rad: float
+    step_rad: float
+    """Greatest change of its command in one tick."""
+    braking_rad: float
+    """Greatest change of that change, by its acceleration."""
+
+
+class Envelope(msgspec.Struct, frozen=True, kw_only=True):
+    """One profile of one arm at one tick, base frame, joints base to wrist 3."""
+
+    tick_s: float
+    joints: tuple[JointEnd, ...]
+    part_step_m: Vec3
+    """Greatest way of the tool centre point, the flange and the elbow in one tick."""
+    fences: tuple[FenceGap, ...]
+    cone_rad: float
+    cone_cosine: float
+    cone_near_cosine: float
+    """Nearer to straight down than this, no tilt of a tick's length matters."""
+    fence_braking_m: float
+    """Change of the way per tick, from tick to tick, that is counted on ahead of a fence."""
+    fence_far_m: float
+    """From a gap this wide no part needs to slow down, however fast it goes."""
+
+    @classmethod
+    def of(cls, profile: Profile, arm: ArmConfig, *, tick_s: float) -> "Envelope":
+        """Return a profile made ready.
+
+        Args:
+            profile: what may be done.
+            arm: the arm as config.limited left it: no wider than the profile.
+            tick_s: how long each command holds.
+        """
+        space, speeds = profile.workspace, profile.speeds
+        braking = profile.stopping.deceleration_m_s2 * tick_s * tick_s
+        fastest = max(speeds.tcp_m_s, speeds.flange_m_s, speeds.elbow_m_s)
+        joints = tuple(
+            JointEnd(
+                joint.range_rad[0],
+                joint.range_rad[1],
+                limit.soft_margin_rad,
+                joint.speed_rad_s * tick_s,
+                limit.acceleration_rad_s2 * tick_s * tick_s,
+            )
+            for joint, limit in zip(arm.joints, profile.joints, strict=True)
+        )
+        fences = [BoxGap(f.name, PARTS.index(part), f.low_m, f.high_m) for f in space.boxes for part in f.parts]
+        planes = [_plane(plane, part) for plane in space.planes for part in plane.parts]
+        outs = [_keep_out(out, part) for out in space.keep_outs for part in out.parts]
+        return cls(
+            tick_s=tick_s,
+            joints=joints,
+            part_step_m=(speeds.tcp_m_s * tick_s, speeds.flange_m_s * tick_s, speeds.elbow_m_s * tick_s),
+            fences=(*fences, *planes, *outs),
+            cone_rad=space.tool_cone_rad,
+            cone_cosine=math.cos(space.tool_cone_rad),
+            cone_near_cosine=math.cos(max(0.0, space.tool_cone_rad - CONE_NEAR_RAD)),
+            fence_braking_m=braking,
+            fence_far_m=FAR_M + fastest * fastest / (2.0 * profile.stopping.deceleration_m_s2),
+        )
+
+
+def braking_step(gap: float, braking: float) -> float:
+    """Return the longest step of one tick after which what is left of a gap still suffices to come to rest in.
+
+    A step s leaves gap - s, and from s the steps fall by `braking` a tick: s^2 <= 2 braking (gap - s), the law
+    v^2 <= 2 a d at the end of the tick.
+
+    Args:
+        gap: what is left before the step; 0 or less allows none.
+        braking: a t^2, greatest change of a step from tick to tick.
+    """
+    return math.sqrt(braking * braking + 2.0 * braking * gap) - braking if gap > 0.0 else 0.0
+
+
+def soft_step(gap: float, margin: float, step: float) -> float:
+    """Return the longest step towards an end from a gap before it: from `step` at the margin down to a tenth of it.
+
+    The step s is held to what is allowed where it ends: s <= step (S + (1 - S) (gap - s) / margin).
+    """
+    if margin <= 0.0:
+        return step
+    return max(0.0, step * (SLOWEST_SHARE + (1.0 - SLOWEST_SHARE) * gap / margin)) / (
+        1.0 + step * (1.0 - SLOWEST_SHARE) / margin
+    )
+
+
+def _plane(plane: Plane, part: ArmPart) -> PlaneGap:
+    length = math.hypot(*plane.normal)
+    x, y, z = (v / length for v in plane.normal)
+    px, py, pz = plane.point_m
+    return PlaneGap(plane.name, PARTS.index(part), (x, y, z), x * px + y * py + z * pz)
+
+
+def _keep_out(out: KeepOut, part: ArmPart) -> KeepOutGap:
+    return KeepOutGap(out.name, PARTS.index(part), out.low_m, out.high_m, out.radius_m)
+
+
+def _inwards(at_m: Vec3, low_m: Vec3, high_m: Vec3) -> Vec3:
+    """Return the direction away from the nearest face of a box."""
+    _, axis, sign = min(
+        (depth, axis, sign)
+        for axis in range(3)
+        for depth, sign in ((at_m[axis] - low_m[axis], 1.0), (high_m[axis] - at_m[axis], -1.0))
+    )
+    return (sign if axis == 0 else 0.0, sign if axis == 1 else 0.0, sign if axis == 2 else 0.0)

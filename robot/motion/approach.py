@@ -1,0 +1,276 @@
+"""Targets are brought up to what the arm must keep clear of, and no nearer: bodies, and postures it cannot move in.
+
+The tool always rests on its target without overshoot, so that a target that stays clear is a brake that comes in time:
+nothing is slowed before it must be, and the arm stops at the limit, not a hand before it. Of a step only the part that
+leads nearer is taken away, as much of it as there is no room for. So the step is a continuous function of the direction
+asked for, and what leads away or along is done in full.
+"""
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+
+import msgspec
+import numpy as np
+from numpy.typing import NDArray
+
+from config.arm import ArmConfig
+from robot.kinematics import ToolChain
+from robot.messages import Vec3, Vec6
+from robot.safety import Braking, Clearance
+
+__all__ = ["Approach", "Margins", "Wall", "singular_room", "yielding"]
+
+Array = NDArray[np.float64]
+Inverse = Callable[[Vec3, Vec6], Vec6 | None]
+DAMPING = 1e-4
+ROUNDS = 4
+HALVINGS = 4
+FAR_AHEAD_M, CORNER_M = 0.06, 0.02
+"""A free tool trails its target by less; one that is held up may cut a corner, if a body is so near."""
+TOLERANCE_M = 5e-4
+"""What a step past a curved wall may lose of a margin."""
+EASE = 1e-3
+SHARE, SINGULAR_SHARE = 0.6, 0.25
+"""Towards a singularity the joints go the faster the nearer it is: the tool is slowed sooner."""
+"""A step beside a wall that is too near already leads away by as much."""
+DIFFERENCE_RAD = 1e-6
+
+
+class Margins(msgspec.Struct, frozen=True, kw_only=True):
+    """Where targets stop short of what the gate refuses."""
+
+    clearance_m: float = 0.008
+    """Beyond the distance that each pair keeps: what a stop at the worst may overrun, and bends of the way."""
+    elbow: float = 0.3
+    """Least sine of the elbow: stretched or folded flat the tool cannot go on along the arm."""
+    wrist: float = 0.1
+    """Least sine of wrist 2."""
+    shoulder_m: float = 0.06
+    """Least distance of wrist 2's centre from the upright plane through the base's axis."""
+
+
+class Wall(msgspec.Struct, frozen=True):
+    """Room left in one respect, and how it changes with the step."""
+
+    name: str
+    room: float
+    slope: tuple[float, ...]
+    share: float = 0.5
+    """Of the room that is left no step takes more: the tool is slowed towards a wall while it begins to slide along."""
+
+
+def yielding(step: Sequence[float], walls: Sequence[Wall]) -> tuple[list[float], str | None]:
+    """Take from a step what leads nearer to walls than there is room for.
+
+    Walls are met in turn a few times over; what is left of a corner between several is seen to by the caller.
+
+    Returns:
+        The step, unchanged where there is room, and the wall that took most of it.
+    """
+    left, blamed, most = list(step), None, 0.0
+    for _ in range(ROUNDS):
+        is_changed = False
+        for wall in walls:
+            size = sum(s * s for s in wall.slope)
+            excess = -sum(s * x for s, x in zip(wall.slope, left, strict=True)) - (
+                wall.share * wall.room if wall.room > 0.0 else max(wall.room, -EASE)
+            )
+            if excess > 0.0 < size:
+                left = [x + excess / size * s for s, x in zip(wall.slope, left, strict=True)]
+                is_changed = is_changed or excess > 1e-12
+                if excess / math.sqrt(size) > most:
+                    blamed, most = wall.name, excess / math.sqrt(size)
+        if not is_changed:
+            break
+    return left, blamed
+
+
+def singular_room(arm: ArmConfig, q: Vec6) -> tuple[float, float, float]:
+    """Return the three factors of the tool's Jacobian determinant: sines of elbow and wrist 2, wrist 2's reach (m).
+
+    det J of an arm with this offset geometry is proportional to their product; each is 0 at one singularity.
+    """
+    rows = arm.joints
+    upper, fore, wrist = rows[1].a_m, rows[2].a_m, rows[4].d_m
+    q23 = q[1] + q[2]
+    reach = upper * math.cos(q[1]) + fore * math.cos(q23) + wrist * math.sin(q23 + q[3])
+    return abs(math.sin(q[2])), abs(math.sin(q[4])), abs(reach)
+
+
+class Approach:
+    """Steps of the target of one arm at one table."""
+
+    def __init__(
+        self, arm: ArmConfig, clearance: Clearance, *, braking: Braking, margins: Margins | None = None
+    ) -> None:
+        self._arm, self._clearance = arm, clearance
+        self._speed_m_s, self._braking_m_s2 = arm.motion.speed_m_s, arm.motion.acceleration_m_s2
+        self._chain = ToolChain(arm)
+        self._workspace_m = arm.motion.workspace_m
+        self._stop_rad_s2 = braking.least_rad_s2
+        self._at_m: Vec3 | None = None
+        self._q: Vec6 | None = None
+        self._rooms_of: Vec6 | None = None
+        self._rooms_there: tuple[float, ...] = ()
+        self._margins = margins or Margins()
+        self._least = (self._margins.elbow, self._margins.wrist, self._margins.shoulder_m)
+
+    def clear_place(self, at_m: Vec3, target_m: Vec3, *, now_rad: Vec6, joints_at: Inverse) -> tuple[Vec3, str | None]:
+        """Return a target as near to the one asked for as stays clear, and what kept it away.
+
+        Args:
+            at_m: the target before.
+            target_m: the target asked for.
+            now_rad: the joints commanded by now.
+            joints_at: the joints that bring the tool to a place, near others.
+        """
+        if target_m == at_m:
+            return target_m, None
+        q_at = self._q if at_m == self._at_m else joints_at(at_m, now_rad)
+        if q_at is None:
+            at_m, q_at = self._chain.tcp(now_rad), now_rad
+        q = joints_at(target_m, q_at)
+        overrun_m = 0.0 if q is None else self._overrun_m(q_at, q, math.dist(at_m, target_m))
+        if q is not None and overrun_m == 0.0 and self._is_far(self._rooms(q_at), self._rooms(q)):
+            place_m, because = self._take(target_m, q), None
+        else:
+            place_m, because = self._yield(at_m, target_m, q_at, overrun_m, joints_at)
+        return self._uncut(place_m, because, now_rad, joints_at)
+
+    def _uncut(self, place_m: Vec3, because: str | None, now_rad: Vec6, joints_at: Inverse) -> tuple[Vec3, str | None]:
+        """Draw a target that runs far ahead of a tool near a body to the tool's own side of it: no corner is cut."""
+        now_m = self._chain.tcp(now_rad)
+        is_far_ahead = math.dist(place_m, now_m) >= FAR_AHEAD_M
+        if not is_far_ahead and self._rooms_there[0] > CORNER_M:
+            return place_m, because
+        if self._clearance.gap(now_rad) > (CORNER_M if is_far_ahead else self._margins.clearance_m - TOLERANCE_M):
+            return place_m, because
+        ahead = [b - a for a, b in zip(now_m, place_m, strict=True)]
+        J = self._clearance.tool_jacobian(now_rad)
+        margin_m = self._margins.clearance_m
+        walls = [
+            Wall(w.name, w.room, tuple(_over_tool(w.slope, J)), 1.0)
+            for w in self._bodies(now_rad, margin_m, _length(ahead))
+        ]
+        left, blamed = yielding(ahead, walls)
+        if blamed is None:
+            return place_m, because
+        place_m = (now_m[0] + left[0], now_m[1] + left[1], now_m[2] + left[2])
+        q = joints_at(place_m, now_rad)
+        return (now_m if q is None else self._take(place_m, q)), blamed
+
+    def _take(self, place_m: Vec3, q: Vec6) -> Vec3:
+        self._at_m, self._q = place_m, q
+        return place_m
+
+    def _rooms(self, q: Vec6) -> tuple[float, ...]:
+        """Return what is left to each margin."""
+        if q != self._rooms_of:
+            margins = (self._margins.clearance_m, *self._least)
+            here = (self._clearance.gap(q), *singular_room(self._arm, q))
+            self._rooms_of, self._rooms_there = q, tuple(h - m for h, m in zip(here, margins, strict=True))
+        return self._rooms_there
+
+    def _is_far(self, at: tuple[float, ...], there: tuple[float, ...]) -> bool:
+        """Whether a step takes no more than its share of any room, or ends where bodies are too far to be looked at."""
+        gap_at, gap_there = at[0], there[0]
+        if (
+            gap_there < self._clearance.most_m - self._margins.clearance_m
+            and not gap_there >= gap_at * (1.0 - SHARE) >= 0.0
+        ):
+            return False
+        return all(b >= a * (1.0 - SINGULAR_SHARE) >= 0.0 for a, b in zip(at[1:], there[1:], strict=True))
+
+    def _overrun_m(self, a: Vec6, b: Vec6, moved_m: float) -> float:
+        """Return how much farther than motion's own braking a stop at the worst may carry the tool here.
+
+        Motion brakes the tool at its acceleration, a stop the fastest joint at its own: where a joint turns far for a
+        small way of the tool, as over the base, a stop takes longer.
+        """
+        turn_rad_m = max([abs(u - v) for u, v in zip(a, b, strict=True)]) / moved_m
+        return max(0.0, self._speed_m_s**2 / 2.0 * (turn_rad_m / self._stop_rad_s2 - 1.0 / self._braking_m_s2))
+
+    def _yield(
+        self, at_m: Vec3, target_m: Vec3, q_at: Vec6, overrun_m: float, joints_at: Inverse
+    ) -> tuple[Vec3, str | None]:
+        step = [b - a for a, b in zip(at_m, target_m, strict=True)]
+        J = self._clearance.tool_jacobian(q_at)
+        margin_m = self._margins.clearance_m + overrun_m
+        walls = [
+            Wall(w.name, w.room, tuple(_over_tool(w.slope, J)), w.share)
+            for w in (*self._bodies(q_at, margin_m, _length(step)), *self._singular(q_at))
+        ]
+        walls += self._fences(at_m, overrun_m)
+        left, blamed = yielding(step, walls)
+        for _ in range(HALVINGS):
+            place = (at_m[0] + left[0], at_m[1] + left[1], at_m[2] + left[2])
+            q = joints_at(place, q_at)
+            if q is not None and self._is_no_worse(q_at, q, overrun_m):
+                return self._take(place, q), blamed
+            left = [0.5 * x for x in left]
+        return at_m, blamed or "clearance"
+
+    def _fences(self, at_m: Vec3, overrun_m: float) -> Iterator[Wall]:
+        if overrun_m > 0.0:
+            for i, (x, low, high) in enumerate(zip(at_m, *self._workspace_m, strict=True)):
+                slope = [0.0, 0.0, 0.0]
+                slope[i] = 1.0
+                yield Wall("workspace", x - low - overrun_m, tuple(slope))
+                yield Wall("workspace", high - x - overrun_m, tuple(-s for s in slope))
+
+    def clear_joints(self, q_at: Vec6, wanted: Vec6) -> tuple[Vec6, str | None]:
+        """Return joints as near to those asked for as stay clear, the way there too, and what kept them away."""
+        margin = self._margins.clearance_m
+        if self._is_way_clear(q_at, wanted, margin):
+            return wanted, None
+        step = [b - a for a, b in zip(q_at, wanted, strict=True)]
+        left, blamed = yielding(step, list(self._bodies(q_at, margin, _length(step))))
+        floor = min(margin, self._clearance.gap(q_at))
+        for _ in range(HALVINGS):
+            there = _vec6([a + s for a, s in zip(q_at, left, strict=True)])
+            if self._is_way_clear(q_at, there, floor - 1e-4):
+                return there, blamed
+            left = [0.5 * x for x in left]
+        return q_at, blamed or "clearance"
+
+    def _is_way_clear(self, a: Vec6, b: Vec6, margin: float) -> bool:
+        gap = self._clearance.gap
+        return all(gap(_vec6([u + k / 4 * (v - u) for u, v in zip(a, b, strict=True)])) >= margin for k in (4, 3, 2, 1))
+
+    def _bodies(self, q: Vec6, margin_m: float, far: float) -> Iterator[Wall]:
+        """Yield what is near, its room and its slope over the joints."""
+        for c in self._clearance.closest(q, within_m=margin_m + 3.0 * far):
+            yield Wall("clearance", c.gap_m - margin_m, c.slope_m_rad, SHARE)
+
+    def _singular(self, q: Vec6) -> Iterator[Wall]:
+        here = singular_room(self._arm, q)
+        for k, (room, least) in enumerate(zip(here, self._least, strict=True)):
+            if room < 4.0 * least:
+                yield Wall("singularity", room - least, self._singular_slope(q, k, room), SINGULAR_SHARE)
+
+    def _singular_slope(self, q: Vec6, k: int, here: float) -> tuple[float, ...]:
+        slope = []
+        for i in range(6):
+            moved = list(q)
+            moved[i] += DIFFERENCE_RAD
+            slope.append((singular_room(self._arm, _vec6(moved))[k] - here) / DIFFERENCE_RAD)
+        return tuple(slope)
+
+    def _is_no_worse(self, q_at: Vec6, q: Vec6, extra_m: float) -> bool:
+        """Whether a place keeps the margins, or what the one before had of them where that is less."""
+        extra = (extra_m, 0.0, 0.0, 0.0)
+        rooms = zip(self._rooms(q_at), self._rooms(q), extra, strict=True)
+        return all(there - e >= min(here - e, -TOLERANCE_M) for here, there, e in [*rooms])
+
+
+def _over_tool(slope: Sequence[float], J: Array) -> list[float]:
+    """Return a slope over the joints as one over the tool's place, its turn kept: the first three of J^-T slope."""
+    return np.linalg.solve(J @ J.T + DAMPING * np.eye(6), J @ np.asarray(slope))[:3].tolist()
+
+
+def _length(step: Sequence[float]) -> float:
+    return math.sqrt(sum(x * x for x in step))
+
+
+def _vec6(x: Sequence[float]) -> Vec6:
+    return x[0], x[1], x[2], x[3], x[4], x[5]
