@@ -13,7 +13,7 @@ from robot.envelope import BoxGap, KeepOutGap, PlaneGap, braking_step, soft_step
 from robot.errors import RobotConfigError
 from robot.hal.fake import FakeArm
 from robot.kinematics import ToolChain
-from robot.safety import Reason, check_profile_fits
+from robot.safety import Gate, GateLimits, Reason, check_profile_fits
 from robot.safety.checks_profile import (
     check_cone,
     check_fences,
@@ -189,6 +189,13 @@ def test_a_tool_at_its_cone_passes_and_the_next_float_does_not():
     assert check_cone(edge, ENVELOPE) is None
     assert reason(check_cone(math.nextafter(edge, DOWN), ENVELOPE)) is Reason.CONE
     assert reason(check_cone(math.nan, ENVELOPE)) is Reason.CONE
+
+
+def test_a_gate_tells_the_limits_that_it_holds():
+    spec = FakeArm(arm=ARM, tick_s=DT).spec
+    limits = GateLimits.of(ARM, spec, table_m=0.0, tick_s=DT)
+    gate = Gate(arm=FakeArm(arm=ARM, tick_s=DT), limits=limits, envelope=ENVELOPE, chain=ToolChain(ARM))
+    assert gate.limits is limits
 
 
 @given(ANGLES)

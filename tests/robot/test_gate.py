@@ -5,13 +5,16 @@ from pathlib import Path
 import pytest
 from msgspec.structs import replace
 
+from config.limited import limited
+from config.limits import Plane, Workspace
 from config.loader import load_arm
+from robot.envelope import Envelope
 from robot.errors import RobotConfigError
 from robot.hal.fake import FakeArm
 from robot.kinematics import Kinematics, ToolChain
 from robot.messages import ArmMode, GripCommand, Heading, Outcome
 from robot.safety import Gate, GateLimits, Reason
-from tests.support.profiles import envelope, open_envelope
+from tests.support.profiles import envelope, open_envelope, profile
 from tests.support.stations import TICK_NS, arm_state, command
 
 ARM = load_arm("ur5e")
@@ -257,3 +260,32 @@ def test_only_the_gate_writes_to_an_arm():
         if "controller" not in path.parts and list(writers(path))
     }
     assert callers == {"robot/safety/gate.py"}
+
+
+ANY_RATE = tuple(replace(j, acceleration_rad_s2=1000.0) for j in profile().joints)
+NEAR_ENDS = tuple(replace(j, range_rad=(j.range_rad[0], q + 0.03)) for j, q in zip(ANY_RATE, START, strict=True))
+WALL = Plane(name="wall", point_m=(0.0, 0.005, 0.0), normal=(0.0, -1.0, 0.0))
+
+
+@pytest.mark.parametrize(
+    ("name", "changes", "joint", "step", "expected"),
+    [
+        ("attended", {}, 0, 0.0026, Reason.JOINT_ACCELERATION),
+        ("attended", {"joints": ANY_RATE}, 0, 0.01, Reason.PART_SPEED),
+        ("unattended", {"joints": NEAR_ENDS}, 0, 0.019, Reason.SOFT_MARGIN),
+        ("unattended", {"workspace": Workspace(planes=(WALL,))}, 0, 0.019, Reason.FENCE),
+        ("unattended", {"workspace": Workspace(tool_cone_rad=0.01)}, 3, 0.019, Reason.CONE),
+        ("unattended", {}, 0, 0.019, None),
+        ("unattended", {}, 3, 0.019, None),
+    ],
+)
+def test_each_limit_of_the_profile_latches_the_gate(arm, name, changes, joint, step, expected):
+    spec, held = FakeArm(arm=ARM, tick_s=0.01).spec, profile(name, **changes)
+    limits = GateLimits.of(ARM, spec, table_m=0.0, tick_s=0.01)
+    gate = Gate(arm=arm, limits=limits, envelope=Envelope.of(held, limited(ARM, held), tick_s=0.01), chain=CHAIN)
+    gate.seed(arm_state(START))
+    there = tuple(q + (step if i == joint else 0.0) for i, q in enumerate(START))
+    verdict = gate.write(command(there), arm_state(START), now_ns=0)
+    assert (None if verdict is None else verdict.reason) == expected
+    assert gate.is_latched == (expected is not None)
+    assert len(arm.commands) == (expected is None)

@@ -146,3 +146,27 @@ def test_the_motion_bench_times_every_tick():
     assert len(costs.tick_us) == len(costs.gate_us) == 200
     assert costs.n_latches == 0
     assert all(whole >= gate > 0.0 for whole, gate in zip(costs.tick_us, costs.gate_us, strict=True))
+
+
+def _reaches(is_shaped):
+    """Return how many time steps each of ten reaches over the working table took."""
+    station, _ = open_twin(RESOLVED)
+    station.reset(seed=3, epoch=0)
+    if not is_shaped:
+        station._loop._mover._approach = None
+    rng, taken = np.random.default_rng(7), []
+    for height in (0.225, 0.2) * 5:
+        goal, n = (rng.uniform(0.26, 0.62), rng.uniform(-0.34, 0.34), height), 0
+        while math.dist(at := station._percept.tcp_position_m, goal) >= 0.006:
+            far = math.dist(at, goal)
+            speed = min(SPEED_M_S, 5.0 * far)
+            came = station.step(Twist(linear_m_s=tuple(speed * (b - a) / far for a, b in zip(at, goal, strict=True))))
+            assert not came.verdicts
+            n += 1
+            assert n < 100
+        taken.append(n)
+    return taken
+
+
+def test_keeping_clear_costs_an_honest_driver_nothing_over_the_working_table():
+    assert sum(_reaches(True)) <= 1.15 * sum(_reaches(False))
