@@ -37,6 +37,10 @@ class Rig(Section, frozen=True, kw_only=True):
     """What makes percepts; without one nothing can be learnt here, and the arm is not connected to."""
     operator: ImportString | None = None
     """Who arms the station where no hardware is attached; refused by a real arm."""
+    view: ImportString | None = None
+    """What shows arm and table to somebody who drives."""
+    shadow: ImportString | None = None
+    """What a driver's intents may be tried on before they are sent."""
     cell: str | None = None
     """A shipped cell's name or a path: where the control box has the table's signals. Straight through where absent."""
     reset: Annotated[str, Meta(pattern=r"^(twin|person)\Z")] = "twin"

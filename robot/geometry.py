@@ -4,7 +4,7 @@ import math
 
 from robot.messages import Quat, Vec3
 
-__all__ = ["inside_box", "quat_of_rotation_vector", "tool_offset", "turn_about_vertical", "unwound"]
+__all__ = ["inside_box", "quat_of_rotation_vector", "rotated", "tool_offset", "turn_about_vertical", "unwound"]
 
 
 def tool_offset(point_m: Vec3, tcp_m: Vec3, yaw_rad: float) -> Vec3:
@@ -39,6 +39,14 @@ def quat_of_rotation_vector(rx: float, ry: float, rz: float) -> Quat:
         return 1.0, rx / 2.0, ry / 2.0, rz / 2.0
     share = math.sin(angle / 2.0) / angle
     return math.cos(angle / 2.0), rx * share, ry * share, rz * share
+
+
+def rotated(vector: Vec3, quat: Quat) -> Vec3:
+    """Return a vector turned by a unit quaternion, scalar first: v + 2 w (u x v) + 2 u x (u x v)."""
+    w, a, b, c = quat
+    x, y, z = vector
+    p, q, r = 2.0 * (b * z - c * y), 2.0 * (c * x - a * z), 2.0 * (a * y - b * x)
+    return x + w * p + b * r - c * q, y + w * q + c * p - a * r, z + w * r + a * q - b * p
 
 
 def unwound(angle: float, reference: float) -> float:

@@ -4,14 +4,17 @@ from pathlib import Path
 
 from config.limited import limited
 from config.resolved import Resolved
+from config.rig import Rig
 from robot.bus import open_session
 from robot.bus.twin_link import RemoteResetter, RemoteTruth
 from robot.errors import RobotConfigError
+from robot.hal.pendant import Pendant
 from robot.hal.protocols import Resetter, SceneTruth
 from robot.local_station import LocalStation, Perceives
 from robot.messages import PlantIdentity
+from robot.motion import AskedHand
 from robot.person import TerminalPerson
-from robot.person_reset import PersonResetter
+from robot.person_reset import PersonLook, PersonResetter
 from robot.person_station import PersonResetStation
 from robot.servo_client import ServoClient
 
@@ -21,7 +24,7 @@ __all__ = ["build_lab_station"]
 class _LabWorld:
     """The plant as the bus and the servo process know it (robot.local_station.World)."""
 
-    def __init__(self, *, loop: ServoClient, truth: SceneTruth, resetter: Resetter) -> None:
+    def __init__(self, *, loop: ServoClient, truth: SceneTruth | None, resetter: Resetter) -> None:
         self._loop = loop
         self.truth: SceneTruth | None = truth
         self.resetter = resetter
@@ -34,13 +37,16 @@ class _LabWorld:
         return self._loop.identity
 
 
-def build_lab_station(resolved: Resolved, perception: Perceives, *, pictures: Path) -> LocalStation:
+def build_lab_station(
+    resolved: Resolved, perception: Perceives, *, pictures: Path, is_driven: bool = False
+) -> LocalStation:
     """Return the station of a rig with a bus, disarmed; the bus is open, the arm not connected to.
 
     Args:
         resolved: rig, arm, scenario and rule sets.
         perception: what makes percepts.
         pictures: where a person who lays the table out finds what belongs where.
+        is_driven: a person drives; where a person lays the table out nobody else on the bus is needed then.
 
     Raises:
         RobotConfigError: the rig names no bus.
@@ -49,6 +55,8 @@ def build_lab_station(resolved: Resolved, perception: Perceives, *, pictures: Pa
     rig, arm = resolved.rig, limited(resolved.arm, resolved.profile)
     if rig.bus is None:
         raise RobotConfigError(f"rig {rig.name}: expected the endpoint of its bus, came none")
+    if is_driven and rig.reset == "person":
+        return _driven_station(resolved, perception)
     session = open_session(rig.bus, is_hub=False)
     loop = ServoClient(resolved, when_closed=session.close)
     truth = RemoteTruth(session, rig.expected.serial)
@@ -58,10 +66,29 @@ def build_lab_station(resolved: Resolved, perception: Perceives, *, pictures: Pa
         )
         world = _LabWorld(loop=loop, truth=truth, resetter=by_person)
         station = PersonResetStation(
-            world=world, loop=loop, perception=perception, arm=arm, scenario=resolved.scenario, rig=rig
-        )
+            world=world, loop=loop, perception=perception, arm=arm, scenario=resolved.scenario, rig=rig,
+            cell_shows=_pendant_of(rig),
+        )  # fmt: skip
         station.prepare(by_person, resolved.arm.home_rad)
         return station
     resetter = RemoteResetter(session, rig.expected.serial, loop=loop, truth=truth)
     world = _LabWorld(loop=loop, truth=truth, resetter=resetter)
-    return LocalStation(world=world, loop=loop, perception=perception, arm=arm, scenario=resolved.scenario, rig=rig)
+    return LocalStation(
+        world=world, loop=loop, perception=perception, arm=arm, scenario=resolved.scenario, rig=rig,
+        hand=AskedHand(arm) if is_driven else None, cell_shows=_pendant_of(rig),
+    )  # fmt: skip
+
+
+def _driven_station(resolved: Resolved, perception: Perceives) -> LocalStation:
+    """Return the station of an arm that a person drives and whose table a person sees to."""
+    loop, arm = ServoClient(resolved), limited(resolved.arm, resolved.profile)
+    world = _LabWorld(loop=loop, truth=None, resetter=PersonLook(loop=loop, person=TerminalPerson()))
+    return LocalStation(
+        world=world, loop=loop, perception=perception, arm=arm, scenario=resolved.scenario, rig=resolved.rig,
+        hand=AskedHand(arm), cell_shows=_pendant_of(resolved.rig),
+    )  # fmt: skip
+
+
+def _pendant_of(rig: Rig) -> Pendant | None:
+    """Return where a code for arming is shown: on a real arm's pendant. A virtual one has none that anybody sees."""
+    return Pendant(rig.address) if rig.address is not None and rig.expected.kind == "real" else None

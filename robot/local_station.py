@@ -1,5 +1,7 @@
 """A station: perception and the hand's reflexes around a loop that holds the arm, and the arming of it all."""
 
+from collections.abc import Callable
+from time import monotonic_ns
 from types import TracebackType
 from typing import Protocol
 
@@ -26,8 +28,8 @@ from robot.messages import (
     Vec3,
     Verdict,
 )
-from robot.motion import HandReflexes
-from robot.safety import Arming, Reason
+from robot.motion import Hand, HandReflexes
+from robot.safety import Answer, Arming, Challenges, Lease, Reason, Tenure, draw_code
 from robot.tick_loop import Stride
 
 __all__ = ["LocalStation", "Perceives"]
@@ -115,6 +117,9 @@ class LocalStation:
     Each tick of the loop: read, cell, motion, gate, wait. The percept is made once, at the end of a step; the hand's
     reflexes are decided once, at its beginning. After arming, a reset or a latch everything starts from the measured
     state, so that an epoch depends on nothing before its reset.
+
+    It is armed for one source, one profile and one lease. With any of them what it was armed for ends: at the next look
+    it stops the arm and is disarmed. A lease is renewed by every step.
     """
 
     def __init__(
@@ -126,11 +131,32 @@ class LocalStation:
         arm: ArmConfig,
         scenario: Scenario,
         rig: Rig,
+        hand: Hand | None = None,
+        cell_shows: Callable[[str], None] | None = None,
+        host_ns: Callable[[], int] = monotonic_ns,
     ) -> None:
+        """Put the parts together; nothing is connected to.
+
+        Args:
+            world: the plant, besides its arm.
+            loop: what holds the arm.
+            perception: what makes percepts.
+            arm: the arm's file.
+            scenario: the table.
+            rig: what may be armed, and how often it may latch.
+            hand: decides what the fingers do; the reflexes where None.
+            cell_shows: shows a text at the cell, as on the arm's pendant; None where only a console can.
+            host_ns: this process's monotonic time, by which leases expire and answers are late.
+        """
         table_m = scenario.table.height_m
         self._world, self._loop, self._perception, self._rig = world, loop, perception, rig
-        self._reflexes = HandReflexes(arm=arm, scenario=scenario)
-        self._arming = Arming(expected=rig.expected, max_latches=rig.max_latches, latch_window=rig.latch_window)
+        self._reflexes: Hand = HandReflexes(arm=arm, scenario=scenario) if hand is None else hand
+        self._arming = Arming(
+            expected=rig.expected, max_latches=rig.max_latches, latch_window=rig.latch_window,
+            challenges=Challenges(now_ns=host_ns, draw=draw_code),
+        )  # fmt: skip
+        self._cell_shows = cell_shows
+        self._tenure = Tenure(arming=self._arming, profile=rig.profile, now_ns=host_ns)
         self._spec = StationSpec(
             n_distances=len(scenario.distances),
             n_buttons=len(scenario.buttons),
@@ -166,12 +192,28 @@ class LocalStation:
             why = self._loop.why_lost
             if why is not None:
                 self._arming.latch(why)
+        self._hold_to_grant()
         return self._arming.state
 
     @property
     def identity(self) -> PlantIdentity:
         """Which world this is."""
         return self._world.identity
+
+    @property
+    def measured(self) -> ArmState:
+        """What the arm measured last, at the end of a step, a reset or engaging."""
+        return self._measured
+
+    @property
+    def percept(self) -> Percept:
+        """What was perceived last."""
+        return self._percept
+
+    @property
+    def loop(self) -> Loop:
+        """Who holds the arm, for whoever checks it past the station's door."""
+        return self._loop
 
     @property
     def model_sha256(self) -> str | None:
@@ -189,15 +231,53 @@ class LocalStation:
             self._loop.connect()
             self._is_connected = True
 
-    def arm(self, *, by: str) -> None:
+    def take_lease(self, source: str, *, life_ns: int | None = None) -> Lease:
+        """Give the lease to a source; without a step for longer than its life it ends (None: it never does).
+
+        Raises:
+            SafetyError: another source has it.
+        """
+        lease = self._tenure.take(source, life_ns=life_ns)
+        self._hold_to_grant()
+        return lease
+
+    def hand_over(self, to: str, *, life_ns: int | None = None) -> Lease:
+        """Give the lease to another source: the arm is stopped, and must be armed for that one anew.
+
+        Raises:
+            SafetyError: nobody has the lease.
+        """
+        lease = self._tenure.hand_over(to, life_ns=life_ns)
+        self._hold_to_grant()
+        return lease
+
+    def stop(self, *, by: str) -> None:
+        """Stop the arm. Anybody may, whoever has the lease: what was engaged latches, what was armed is disarmed."""
+        was_engaged = self._arming.is_engaged
+        self._arming.stop(f"stopped by {by}")
+        if was_engaged:
+            self._loop.stop()
+
+    def challenge(self) -> str | None:
+        """Let the cell show a code for arming; return it where only a console can show it. For an operator."""
+        self.connect()
+        grant = self._tenure.renewed()
+        code = self._arming.challenge(grant)
+        if self._cell_shows is None:
+            return code
+        self._cell_shows(f"autotelic: to arm for {grant}, type {code}")
+        return None
+
+    def arm(self, *, by: str, answer: Answer | None = None) -> None:
         """Go from disarmed to armed, if this is the plant that the rig names. For an operator."""
         self.connect()
-        self._arming.arm(identity=self._world.identity, by=by)
+        self._arming.arm(identity=self._world.identity, by=by, grant=self._tenure.renewed(), answer=answer)
 
     def engage(self) -> None:
         """Go from armed to engaged: everything starts from the measured state. For an operator."""
         self._arming.require_armed()
         self._loop.engage()
+        self._tenure.renewed()
         self._arming.engage()
         self._seed()
 
@@ -207,9 +287,9 @@ class LocalStation:
         self._world.resetter.reset(seed=seed, epoch=epoch, digital_out=digital_out)
         self._arming.note_plant_reset()
 
-    def clear_latch(self, *, by: str) -> None:
+    def clear_latch(self, *, by: str, answer: Answer | None = None) -> None:
         """Go from latched to armed, after the plant's reset only. For an operator."""
-        self._arming.clear_latch(identity=self._world.identity, by=by)
+        self._arming.clear_latch(identity=self._world.identity, by=by, grant=self._tenure.renewed(), answer=answer)
 
     def reset(self, *, seed: int, epoch: int) -> Percept:
         """Lay the table out for an epoch and return the first percept.
@@ -219,6 +299,7 @@ class LocalStation:
         """
         self._require_command()
         self.reset_plant(seed=seed, epoch=epoch)
+        self._tenure.renewed()  # the source waited for it
         self._require_command()
         self._loop.engage()  # a plant that stopped its arm for the reset took command away
         return self._seed()
@@ -230,7 +311,9 @@ class LocalStation:
             NotEngagedError: the station is not engaged.
             RobotConfigError: the duration is not a whole number of ticks from one up.
         """
+        self._hold_to_grant()
         self._arming.require_engaged()
+        self._tenure.renewed()
         duration = self._spec.step_s if duration_s is None else duration_s
         n_ticks = self._whole_ticks(duration)
         grip = self._reflexes.decide(self._percept, _grip_of(intent))
@@ -244,7 +327,12 @@ class LocalStation:
         if self._is_connected:
             self._loop.close()
             self._is_connected = False
-        self._arming.disarm()
+        self._tenure.end()
+
+    def _hold_to_grant(self) -> None:
+        """Stop where what the station was armed for is gone."""
+        if not self._tenure.holds():
+            self._loop.stop()
 
     def _require_command(self) -> None:
         """Raise NotEngagedError unless engaged, and latch what was lost unnoticed: no reset takes the arm again."""

@@ -298,10 +298,14 @@ class StationMode(StrEnum):
 
 
 class StationState(Message, frozen=True, kw_only=True):
-    """A station's mode and, when latched, why."""
+    """A station's mode and, when latched or disarmed by an event, why."""
 
     mode: StationMode
     reason: str = ""
+    source: str = ""
+    """Who it is, or was last, armed for: the holder of its lease."""
+    profile: str = ""
+    """The limits that it is, or was last, armed with."""
 
 
 class StationSpec(Message, frozen=True, kw_only=True):

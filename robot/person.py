@@ -8,6 +8,7 @@ import typer
 from robot.errors import SafetyError
 from robot.messages import StationMode
 from robot.safety.arming import Armable
+from robot.safety.challenge import LIFE_NS, Answer, AnsweredBy
 
 __all__ = ["Person", "PersonOperator", "TerminalPerson"]
 
@@ -21,6 +22,10 @@ class Person(Protocol):
 
     def await_key(self, text: str) -> None:
         """Say what is to be done and wait for a key. Raises SafetyError where nobody is there any more."""
+        ...
+
+    def ask(self, text: str) -> str:
+        """Ask for a word and return it. Raises SafetyError where nobody is there any more."""
         ...
 
 
@@ -38,8 +43,25 @@ class TerminalPerson:
             SafetyError: the input has ended.
         """
         typer.echo(f"{text}; then Enter: ", err=True)
-        if not sys.stdin.readline():
-            raise SafetyError("expected a person's key, the input has ended: nobody is at the arm, it stays disarmed")
+        self._line("key")
+
+    def ask(self, text: str) -> str:
+        """Print a line and return what is typed after it.
+
+        Raises:
+            SafetyError: the input has ended.
+        """
+        typer.echo(f"{text}, then Enter: ", err=True)
+        return self._line("word")
+
+    @staticmethod
+    def _line(what: str) -> str:
+        line = sys.stdin.readline()
+        if not line:
+            raise SafetyError(
+                f"expected a person's {what}, the input has ended: nobody is at the arm, it stays disarmed"
+            )
+        return line.strip()
 
 
 class PersonOperator:
@@ -51,20 +73,20 @@ class PersonOperator:
         self._person = TerminalPerson() if person is None else person
 
     def arm_once(self, station: Armable) -> None:
-        """Arm and engage a disarmed station when the person says so."""
+        """Arm and engage a disarmed station when the person says so, and answers what the cell shows."""
         identity = station.identity
         self._person.await_key(
             f"the {identity.kind.value} arm {identity.serial} will be taken and may move from now on: stand clear, "
             "hand on the emergency stop"
         )
-        station.arm(by=self.name)
+        station.arm(by=self.name, answer=self._answer(station))
         station.engage()
 
     def rearm(self, station: Armable, *, seed: int, epoch: int) -> None:
-        """After a latch: let the person look, lay the table out, and clear the latch.
+        """After a latch: let the person look, lay the table out, and clear the latch when the cell's code is answered.
 
         Raises:
-            SafetyError: the station is not latched, or nobody is there.
+            SafetyError: the station is not latched, nobody is there, or the answer is wrong or late.
             TooManyLatchesError: the run has latched too often.
         """
         state = station.state
@@ -75,5 +97,13 @@ class PersonOperator:
             "the arm clear of the table by hand"
         )
         station.reset_plant(seed=seed, epoch=epoch)
-        station.clear_latch(by=self.name)
+        station.clear_latch(by=self.name, answer=self._answer(station))
+        self._person.await_key("the latch is cleared; the arm is taken again next: stand clear")
         station.engage()
+
+    def _answer(self, station: Armable) -> Answer:
+        """Let the cell ask, and the person answer. A console shows the code itself only where nothing else can."""
+        code = station.challenge()
+        shown = "the arm's pendant shows a code of digits" if code is None else f"the code is {code}"
+        typed = self._person.ask(f"{shown}: type it within {LIFE_NS / 1e9:g} s")
+        return Answer(typed, by=AnsweredBy.CONSOLE)

@@ -12,7 +12,7 @@ from robot.layout import Layout, draw_layout
 from robot.messages import SceneState
 from robot.person import Person
 
-__all__ = ["PersonResetter", "misplaced"]
+__all__ = ["PersonLook", "PersonResetter", "misplaced"]
 
 TOLERANCE_M = 0.01
 MM = 1e3
@@ -69,6 +69,24 @@ class PersonResetter:
                 self._person.tell(f"not in place: {line}")
             request = "put right what is not in place"
         self._person.await_key("everything is in place; take your hands off the table, the arm moves next")
+
+
+class PersonLook:
+    """Implements robot.hal.protocols.Resetter where a person drives: nothing is laid out, somebody looks.
+
+    Args:
+        loop: What holds the arm; it gives up command before anybody reaches in.
+        person: Who looks.
+    """
+
+    def __init__(self, *, loop: _Stops, person: Person) -> None:
+        self._loop, self._person = loop, person
+
+    def reset(self, *, seed: int, epoch: int, digital_out: int) -> None:
+        """Let the person see to whatever is wrong. Raises SafetyError where nobody is there any more."""
+        del seed, epoch, digital_out
+        self._loop.stop()
+        self._person.await_key("the arm is disarmed: see to what is wrong at the table, take your hands off it")
 
 
 def misplaced(layout: Layout, scene: SceneState) -> list[str]:

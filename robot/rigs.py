@@ -4,7 +4,8 @@ import inspect
 from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
-from typing import Any
+from time import monotonic_ns
+from typing import TYPE_CHECKING, Any
 
 from config.arm import ArmConfig
 from config.cell import CellConfig
@@ -14,12 +15,27 @@ from config.rig import Rig
 from config.scenario import Scenario
 from robot.errors import RobotConfigError
 from robot.hal.protocols import Plant
-from robot.local_station import LocalStation
+from robot.local_station import LocalStation, Perceives
+from robot.motion import AskedHand
+from robot.own_senses import OwnSenses
 from robot.safety import Operator
 from robot.tick_loop import TickLoop
 from robot.timed import time_world
 
-__all__ = ["build_operator", "build_plant", "build_station", "check_learnable", "check_usable", "load"]
+if TYPE_CHECKING:
+    from robot.teleop.preview import Shadow
+    from robot.teleop.view import View
+
+__all__ = [
+    "build_operator",
+    "build_plant",
+    "build_shadow",
+    "build_station",
+    "build_view",
+    "check_learnable",
+    "check_usable",
+    "load",
+]
 
 
 def load(import_string: str) -> Any:  # noqa: ANN401 - what a string names is known only at run time
@@ -48,6 +64,9 @@ def build_station(
     plant: Plant | None = None,
     heard_by: Callable[[str], None] | None = None,
     pictures: Path = Path("resets"),
+    is_driven: bool = False,
+    cell_shows: Callable[[str], None] | None = None,
+    host_ns: Callable[[], int] = monotonic_ns,
 ) -> LocalStation:
     """Return the station of a resolved config, disarmed and not yet connected.
 
@@ -56,13 +75,17 @@ def build_station(
         plant: One that is already made, in place of the rig's.
         pictures: Folder for what a person who lays the table out needs to see.
         heard_by: A stopwatch's lap that hears of every tick, where the arm is held in this process.
+        is_driven: A person drives: the hand does what it is asked and nothing by itself, and a rig without a perception
+            is good enough.
+        cell_shows: Shows a text at the cell of an arm that is held in this process; a rig with a bus has its own.
+        host_ns: This process's monotonic time, for leases and answers at the cell; never for motion.
     """
     rig, arm, scenario = resolved.rig, resolved.arm, resolved.scenario
     check_usable(rig)
-    perception = _make(_require_perception(rig), "perception", scenario=scenario, arm=arm)
+    perception = _perception_of(resolved, is_driven=is_driven)
     if rig.bus is not None and plant is None:
         return load("robot.lab:build_lab_station")(
-            resolved, perception, pictures=pictures
+            resolved, perception, pictures=pictures, is_driven=is_driven
         )  # brings the bus, which lock-step never needs
     world = build_plant(rig=rig, arm=arm, scenario=scenario, cell=resolved.cell) if plant is None else plant
     if heard_by is not None:
@@ -71,7 +94,17 @@ def build_station(
         arm=world.arm, config=arm, scenario=scenario, rule_sets=resolved.rule_sets, rig=rig, profile=resolved.profile
     )
     held = limited(arm, resolved.profile)
-    return LocalStation(world=world, loop=loop, perception=perception, arm=held, scenario=scenario, rig=rig)
+    return LocalStation(
+        world=world, loop=loop, perception=perception, arm=held, scenario=scenario, rig=rig,
+        hand=AskedHand(held) if is_driven else None, cell_shows=cell_shows, host_ns=host_ns,
+    )  # fmt: skip
+
+
+def _perception_of(resolved: Resolved, *, is_driven: bool) -> Perceives:
+    if is_driven and resolved.rig.perception is None:
+        return OwnSenses()
+    rig = resolved.rig
+    return _make(_require_perception(rig), "perception", scenario=resolved.scenario, arm=resolved.arm)
 
 
 def check_usable(rig: Rig) -> None:
@@ -112,6 +145,22 @@ def _require_perception(rig: Rig) -> str:
 def build_operator(rig: Rig) -> Operator | None:
     """Return who arms this rig's station without hardware, None where a person must."""
     return None if rig.operator is None else _make(rig.operator, "operator")
+
+
+def build_view(resolved: Resolved) -> "View | None":
+    """Return what shows arm and table while somebody drives, not yet opened; None where the rig names nothing."""
+    return None if resolved.rig.view is None else _make(resolved.rig.view, "view", resolved=resolved)
+
+
+def build_shadow(resolved: Resolved) -> "Shadow":
+    """Return what a driver's intents are tried on.
+
+    Raises:
+        RobotConfigError: the rig names nothing for it.
+    """
+    if resolved.rig.shadow is None:
+        raise RobotConfigError(f"rig {resolved.rig.name}: expected a shadow to try intents on, it names none")
+    return _make(resolved.rig.shadow, "shadow", resolved=resolved)
 
 
 def _make(import_string: str, what: str, **parts: object) -> Any:  # noqa: ANN401

@@ -121,6 +121,11 @@ class TickLoop:
         return self._mover.is_in_contact
 
     @property
+    def gate(self) -> Gate:
+        """The last say, for whoever checks it past all shaping."""
+        return self._gate
+
+    @property
     def why_lost(self) -> str | None:
         """Nothing: what runs in this process cannot end without it, and latches only in a time step."""
         return None

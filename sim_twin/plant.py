@@ -64,6 +64,7 @@ class TwinWorld:
         self.grip_control = self.model.actuator("grip").id
         self.grip_set_point = self.data.ctrl[self.grip_control : self.grip_control + 1]
         self.stop_speed_rad_s: Array | None = None
+        self.stop_rad_s2 = STOP_RAD_S2
         self.joint_controls = np.array([self.model.actuator(j.name).id for j in arm.joints])
         self.finger_addresses = [int(self.model.joint(f"finger_{s}").qposadr[0]) for s in ("left", "right")]
 
@@ -96,7 +97,7 @@ class TwinWorld:
     def _ramp_down(self, speed: Array) -> None:
         # One share for all joints, so that the tool stays on its path while it slows down.
         fastest = float(np.abs(speed).max())
-        share = max(0.0, 1.0 - STOP_RAD_S2 * self.tick_s / fastest) if fastest > 0.0 else 0.0
+        share = max(0.0, 1.0 - self.stop_rad_s2 * self.tick_s / fastest) if fastest > 0.0 else 0.0
         speed *= share
         self.data.ctrl[self.joint_controls] += speed * self.tick_s
 

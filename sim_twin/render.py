@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from sim_twin.names import on_table
 from sim_twin.plant import TwinWorld
 
-__all__ = ["NoGLError", "Picture", "Viewpoint", "open_renderer", "render"]
+__all__ = ["NoGLError", "Picture", "Viewpoint", "light_lamps", "open_renderer", "render"]
 
 Picture = NDArray[np.uint8]
 BACKENDS = ("egl", "osmesa")

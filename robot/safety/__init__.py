@@ -1,26 +1,41 @@
 """The last say before the arm: limits, checks, distances, stops, the gate that latches, and arming."""
 
-from robot.safety.arming import Armable, Arming, Operator, TooManyLatchesError
+from robot.safety.arming import Armable, Arming, Grant, Operator, TooManyLatchesError
+from robot.safety.challenge import Answer, AnsweredBy, Challenges, draw_code
 from robot.safety.checks import Reason, Refusal
 from robot.safety.clearance import Clearance
 from robot.safety.collision_model import Hard
 from robot.safety.gate import Gate
+from robot.safety.lease import Lease, LeaseBook
 from robot.safety.limits import GateLimits, check_profile_fits
+from robot.safety.states import TABLE, Event, next_mode
 from robot.safety.stop_check import StopCheck
 from robot.safety.stopping import Braking
+from robot.safety.tenure import Tenure
 
 __all__ = [
+    "TABLE",
+    "Answer",
+    "AnsweredBy",
     "Armable",
     "Arming",
     "Braking",
+    "Challenges",
     "Clearance",
+    "Event",
     "Gate",
     "GateLimits",
+    "Grant",
     "Hard",
+    "Lease",
+    "LeaseBook",
     "Operator",
     "Reason",
     "Refusal",
     "StopCheck",
+    "Tenure",
     "TooManyLatchesError",
     "check_profile_fits",
+    "draw_code",
+    "next_mode",
 ]

@@ -9,18 +9,43 @@ from robot.hal.rtde import RtdeArm
 from robot.hal.rtde_clock import RtdeClock
 from robot.hal.rtde_plant import RtdePlant
 from robot.local_station import LocalStation, Perceives
+from robot.person import Person, PersonOperator, TerminalPerson
 from robot.safety import Armable, Operator
 from robot.station import Station
+from robot.teleop import Device, DrivenStation
+from robot.teleop.driver import Pace, Unpaced
+from robot.teleop.gamepad import Gamepad
+from robot.teleop.keyboard import Keyboard
+from robot.teleop.pace import WallPace
+from robot.teleop.script import ScriptedDevice
+from robot.teleop.spacemouse import SpaceMouse
 from sim_twin.operator import SimulatedOperator
 from sim_twin.plant import TwinArm, TwinPlant
 
-__all__ = ["ARMABLES", "ARMS", "CLOCKS", "OPERATORS", "PERCEIVERS", "PERCEPTIONS", "PLANTS", "STATIONS"]
+__all__ = [
+    "ARMABLES",
+    "ARMS",
+    "CLOCKS",
+    "DEVICES",
+    "DRIVEN",
+    "OPERATORS",
+    "PACES",
+    "PERCEIVERS",
+    "PERCEPTIONS",
+    "PERSONS",
+    "PLANTS",
+    "STATIONS",
+]
 
 PLANTS: tuple[type[Plant], ...] = (FakePlant, TwinPlant, RtdePlant)
 ARMS: tuple[type[Arm], ...] = (FakeArm, TwinArm, RtdeArm)
 CLOCKS: tuple[type[Clock], ...] = (LockStepClock, RtdeClock)
 STATIONS: tuple[type[Station], ...] = (LocalStation,)
 ARMABLES: tuple[type[Armable], ...] = (LocalStation,)
-OPERATORS: tuple[type[Operator], ...] = (SimulatedOperator,)
+OPERATORS: tuple[type[Operator], ...] = (SimulatedOperator, PersonOperator)
+PERSONS: tuple[type[Person], ...] = (TerminalPerson,)
+DEVICES: tuple[type[Device], ...] = (Keyboard, Gamepad, SpaceMouse, ScriptedDevice)
+DRIVEN: tuple[type[DrivenStation], ...] = (LocalStation,)
+PACES: tuple[type[Pace], ...] = (Unpaced, WallPace)
 PERCEPTIONS: tuple[type[Perception], ...] = (GroundTruthPerception,)
 PERCEIVERS: tuple[type[Perceives], ...] = (GroundTruthPerception,)

@@ -1,0 +1,122 @@
+"""`autotelic teleop`: drive an arm by hand, which it does without a sub-command; `check` shows that the limits hold."""
+
+from pathlib import Path
+from typing import Annotated
+
+import msgspec
+import typer
+from rich.console import Console
+
+from config.loader import resolve
+from config.resolved import Resolved
+from robot.chatter import chatter_to_stderr
+from robot.errors import RobotConfigError
+from robot.rigs import load
+from robot.teleop.wanted import Answer, Wanted
+
+__all__ = ["CHECKERS", "app"]
+
+CHECKERS = {"twin": "sim_twin.checking:check_rig"}
+"""Who checks a rig, by the kind of its plant. What is not here is never sent a hostile stream."""
+
+app = typer.Typer(
+    invoke_without_command=True,
+    pretty_exceptions_enable=False,
+    help="Drive an arm by keyboard, gamepad, SpaceMouse or script, safety-limited.",
+)
+
+
+@app.callback()
+def drive(
+    context: typer.Context,
+    rig: Annotated[str, typer.Option("--rig", "-r", help="A shipped rig's name or a file.")] = "twin",
+    scenario: Annotated[str, typer.Option("--scenario", "-s", help="A shipped scenario's name or a file.")] = "paper",
+    device: Annotated[
+        str, typer.Option("--device", "-d", help="keyboard, gamepad, spacemouse or script:FILE.")
+    ] = "keyboard",
+    speed: Annotated[float, typer.Option(min=0.01, max=1.0, help="Share of full speed to begin with.")] = 0.5,
+    seed: Annotated[int, typer.Option(min=0, help="Which table is drawn, where a twin lays it out.")] = 0,
+    *,
+    view: Annotated[bool, typer.Option("--view/--no-view", help="Show the table while driving.")] = True,
+    preview: Annotated[
+        bool, typer.Option("--preview", help="Try every intent on a shadow twin 200 ms before it is sent.")
+    ] = False,
+    fast: Annotated[
+        bool, typer.Option("--fast", help="Twin and script only: as fast as the processor goes, not in real time.")
+    ] = False,
+    json: Annotated[bool, typer.Option("--json", help="Print what the drive came to as one JSON object.")] = False,
+) -> None:
+    """Drive until you quit. Ctrl-C brings the arm to rest and gives the terminal back (exit code 0)."""
+    if context.invoked_subcommand is not None:
+        return
+    from robot.teleop.drive import DriveOptions, run_drive  # brings MuJoCo, which --help does not need
+
+    run_drive(
+        DriveOptions(
+            rig=rig, scenario=scenario, device=device, speed=speed, seed=seed, view=view, preview=preview, fast=fast,
+            json=json,
+        )
+    )  # fmt: skip
+
+
+@app.command()
+def check(
+    *,
+    rig: Annotated[str, typer.Option(help="Which rig; its plant must be a twin.")] = "twin",
+    scenario: Annotated[str, typer.Option(help="Which table.")] = "paper",
+    profile: Annotated[str | None, typer.Option(help="Limits in place of those that the rig names.")] = None,
+    full: Annotated[bool, typer.Option("--full", help="All streams, not a seeded tenth.")] = False,
+    mutate: Annotated[bool, typer.Option("--mutate", help="Weaken each limit alone by 5 %; all must be told.")] = False,
+    stream: Annotated[int | None, typer.Option(min=0, help="One stream alone, by its number.")] = None,
+    seed: Annotated[int, typer.Option(min=0, help="Of all that is drawn.")] = 0,
+    json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
+    out: Annotated[Path | None, typer.Option(help="Folder for report and figure.")] = None,
+    commands: Annotated[int | None, typer.Option(min=1, max=2000, help="Commands a stream.")] = None,
+    blocks: Annotated[int | None, typer.Option(min=1, help="So many blocks of streams only.")] = None,
+    workers: Annotated[int | None, typer.Option(min=1, max=64, help="Processes.")] = None,
+) -> None:
+    """Send hostile and human-like streams through a rig's stack; exit code 1 if the physics broke a limit."""
+    resolved = _with_profile(resolve(rig=rig, scenario=scenario), profile)
+    wanted = Wanted(
+        seed=seed, full=full, json=json, out=out, stream=stream, mutate=mutate, n_commands=commands, n_blocks=blocks,
+        n_workers=workers,
+    )  # fmt: skip
+    checker = load(_checker(resolved))
+    try:
+        with chatter_to_stderr():
+            answer: Answer = checker(resolved, wanted)
+    except KeyboardInterrupt:
+        typer.echo("interrupted: nothing was decided; the same seed begins again", err=True)
+        raise typer.Exit(1) from None
+    if json:
+        typer.echo(answer.json)
+    else:
+        console = Console()
+        for part in answer.shown:
+            console.print(part)
+    if not answer.is_passed:
+        raise typer.Exit(1)
+
+
+def _with_profile(resolved: Resolved, profile: str | None) -> Resolved:
+    if profile is None:
+        return resolved
+    known = [p.name for p in resolved.limits.profiles]
+    if profile not in known:
+        raise typer.BadParameter(f"expected one of {', '.join(known)}, got {profile}", param_hint="--profile")
+    return msgspec.structs.replace(resolved, rig=msgspec.structs.replace(resolved.rig, profile=profile))
+
+
+def _checker(resolved: Resolved) -> str:
+    """Return who checks this rig.
+
+    Raises:
+        RobotConfigError: its plant is not a simulated one in this process: nothing was connected to.
+    """
+    kind, name = resolved.rig.expected.kind, resolved.rig.name
+    if kind in CHECKERS:
+        return CHECKERS[kind]
+    raise RobotConfigError(
+        f"rig {name}: expected a plant of kind {' or '.join(CHECKERS)}, it is {kind}. Hostile streams are for a twin: "
+        "check a twin's rig with the same limits file and profile. Nothing was connected to, nothing moves"
+    )

@@ -1,0 +1,251 @@
+"""An independent monitor: what a profile of limits allows against what the physics did.
+
+It takes the limits from the file and everything else from the twin's own truth: joints, velocities of points, contacts
+and distances between bodies as MuJoCo has them. It shares no line of code with motion, gate or their checks, so that a
+mistake there cannot hide itself here.
+
+Every limit gets a reading: the least margin over the course as a share of the limit, negative where it was broken.
+What a reading may fall below zero by is the plant's part of the story and is in `Allowances`, with its reason.
+"""
+
+import math
+from collections.abc import Iterator
+
+import msgspec
+import numpy as np
+from numpy.typing import NDArray
+
+from config.limits import ArmPart, KeepOut, Plane, Profile
+from sim_twin.allowances import Allowances
+from sim_twin.clearance import FARTHEST_M, Clearances, Nearest, own_pairs, scene_pairs
+from sim_twin.contacts import allowed_pairs, contact_readings
+from sim_twin.plant import TwinWorld
+from sim_twin.points import Points
+from sim_twin.readings import Margin, Reading
+from sim_twin.recorder import Course, PartKind
+from sim_twin.scales import keep_out_scale_m, plane_scale_m
+
+__all__ = ["Monitor"]
+
+Array = NDArray[np.float64]
+_POINT = {ArmPart.TCP: 0, ArmPart.FLANGE: 1, ArmPart.ELBOW: 2}
+CALM_S = 0.15
+"""So long after a contact the joints' acceleration is still the contact's doing: the servo swings it off."""
+REST_M_S = 0.005
+"""Fingers that were stopped while they pressed creep over what they stand on at a few millimetres a second."""
+RINGING_S = 0.1
+HARD_N = 60.0
+"""A hand that holds something light presses on it with less."""
+
+
+class Monitor:
+    """Judges courses of one world against one profile."""
+
+    def __init__(self, world: TwinWorld, profile: Profile, allowances: Allowances) -> None:
+        self._profile, self._allow, self._world = profile, allowances, world
+        self._pointed = Points(world)
+        self._own = Clearances(world, own_pairs(world))
+        self._scene = Clearances(world, scene_pairs(world, allowed_pairs(profile)))
+
+    def judge(self, course: Course) -> tuple[Reading, ...]:
+        """Return a reading of every limit, in the order of the profile."""
+        if course.n_steps == 0:
+            return ()
+        return tuple(
+            msgspec.structs.replace(reading, is_broken=bool(reading.share < -self._allow.of(reading.limit)))
+            for reading in self._readings(course)
+        )
+
+    def margins(self, course: Course) -> Iterator[Margin]:
+        """Return the margin of each limit that has one at every instant, as shares over the course."""
+        yield from self._joints(course)
+        yield from self._set_points(course)
+        yield from self._speeds(course)
+        yield from self._space(course)
+        yield from self._grip(course)
+
+    def _readings(self, course: Course) -> Iterator[Reading]:
+        yield from (margin.worst() for margin in self.margins(course))
+        yield from contact_readings(course, self._profile)
+        yield from _stops(course, self._profile)
+        clearances, dt = self._profile.clearances, course.physics_s * course.n_substeps
+        yield self._clearance("self_clearance", self._own.nearest(course), clearances.self_m, dt)
+        yield self._clearance("scene_clearance", self._scene.nearest(course), clearances.scene_m, dt)
+
+    def _joints(self, course: Course) -> Iterator[Margin]:
+        joints = self._profile.joints
+        low, high = (np.array([j.range_rad[i] for j in joints]) for i in (0, 1))
+        half = (high - low) / 2.0
+        yield Margin(
+            "joint_range", 1.0 - np.abs(course.q_rad - (low + high) / 2.0) / half, course.q_rad, course.physics_s
+        )
+        speed = np.abs(course.qd_rad_s)
+        yield Margin("joint_speed", 1.0 - speed / [j.speed_rad_s for j in joints], speed, course.physics_s)
+        rate = _accelerations(course)
+        if len(rate):
+            yield Margin(
+                "joint_acceleration", 1.0 - rate / [j.acceleration_rad_s2 for j in joints], rate, course.physics_s
+            )
+
+    def _set_points(self, course: Course) -> Iterator[Margin]:
+        """Read what reached the drives: its differences over ticks, exact where the joints themselves lag and swing.
+
+        While the plant stops by itself, is laid out anew, or is in contact, where a set-point falls back to the arm,
+        differences say nothing of a limit.
+        """
+        joints, tick_s = self._profile.joints, course.physics_s * course.n_substeps
+        odd = _near(course, course.stopping | _pressed(course))[:: course.n_substeps][: len(course.set_point_rad)]
+        rate = course.set_point_rad
+        for name, most in (
+            ("command_speed", [j.speed_rad_s for j in joints]),
+            ("command_acceleration", [j.acceleration_rad_s2 for j in joints]),
+            ("command_jerk", [j.jerk_rad_s3 for j in joints]),
+        ):
+            if len(rate) < 2:
+                return
+            rate = np.diff(rate, axis=0) / tick_s
+            came = np.where(odd[len(odd) - len(rate) :, None], 0.0, np.abs(rate))
+            yield Margin(name, 1.0 - came / most, came, tick_s)
+        moved = self._pointed.speeds(course.set_point_rad, tick_s)
+        moved = np.where(odd[len(odd) - len(moved) :, None], 0.0, moved)
+        for i, (name, most) in enumerate(_point_speeds(self._profile)):
+            yield Margin(f"command_{name}_speed", 1.0 - moved[:, i] / most, moved[:, i], tick_s)
+
+    def _speeds(self, course: Course) -> Iterator[Margin]:
+        for i, (name, most) in enumerate(_point_speeds(self._profile)):
+            came = course.speed_m_s[:, i]
+            yield Margin(f"{name}_speed", 1.0 - came / most, came, course.physics_s)
+
+    def _space(self, course: Course) -> Iterator[Margin]:
+        space = self._profile.workspace
+        for box in space.boxes:
+            middle, half = _middle(box.low_m, box.high_m), _half(box.low_m, box.high_m)
+            inside = np.stack([1.0 - np.abs(_at(course, p) - middle) / half for p in box.parts], axis=1)
+            yield Margin(f"box:{box.name}", inside, inside, course.physics_s)
+        for plane in space.planes:
+            height = np.stack([_over(plane, _at(course, p)) for p in plane.parts], axis=1)
+            yield Margin(f"plane:{plane.name}", height / plane_scale_m(plane), height, course.physics_s)
+        for keep in space.keep_outs:
+            away = np.stack([_outside(keep, _at(course, p)) for p in keep.parts], axis=1)
+            yield Margin(f"keep_out:{keep.name}", away / keep_out_scale_m(keep), away, course.physics_s)
+        tilt = np.arccos(np.clip(-course.approach[:, 2], -1.0, 1.0))
+        yield Margin("tool_cone", 1.0 - tilt / space.tool_cone_rad, tilt, course.physics_s)
+
+    def _grip(self, course: Course) -> Iterator[Margin]:
+        grip = self._profile.grip
+        yield Margin("grip_force", 1.0 - course.grip_force_n / grip.force_n[1], course.grip_force_n, course.physics_s)
+        speed = _finger_speeds(course)
+        if len(speed):
+            yield Margin("grip_speed", 1.0 - speed / grip.speed_m_s[1], speed, course.physics_s)
+        low, high = grip.opening_m
+        half = (high - low) / 2.0
+        yield Margin(
+            "grip_opening",
+            1.0 - np.abs(course.opening_m - (low + high) / 2.0) / half,
+            course.opening_m,
+            course.physics_s,
+        )
+
+    def _clearance(self, name: str, near: Nearest, least_m: float, tick_s: float) -> Reading:
+        if least_m <= 0.0:
+            return Reading(limit=name, share=math.inf if near.distance_m > 0.0 else -1.0, value=near.distance_m)
+        share = min(near.distance_m, FARTHEST_M) / least_m - 1.0
+        model = self._world.model
+        parts = [model.body(int(model.geom_bodyid[g])).name for g in near.geoms if g >= 0]
+        return Reading(
+            limit=name, share=share, value=near.distance_m, at_s=near.tick * tick_s, detail=" to ".join(parts)
+        )
+
+
+def _at(course: Course, part: ArmPart) -> Array:
+    return course.position_m[:, _POINT[part]]
+
+
+def _point_speeds(profile: Profile) -> tuple[tuple[str, float], ...]:
+    speeds = profile.speeds
+    return ("tcp", speeds.tcp_m_s), ("flange", speeds.flange_m_s), ("elbow", speeds.elbow_m_s)
+
+
+def _middle(low: tuple[float, ...], high: tuple[float, ...]) -> Array:
+    return np.add(low, high) / 2.0
+
+
+def _half(low: tuple[float, ...], high: tuple[float, ...]) -> Array:
+    return np.subtract(high, low) / 2.0
+
+
+def _over(plane: Plane, at: Array) -> Array:
+    """Return how far points are on the allowed side.  (n, 3) -> (n,)"""
+    normal = np.array(plane.normal)
+    return (at - np.array(plane.point_m)) @ (normal / np.linalg.norm(normal))
+
+
+def _outside(keep: KeepOut, at: Array) -> Array:
+    """Return how far points are outside a rounded box, negative inside.  (n, 3) -> (n,)"""
+    past = np.abs(at - _middle(keep.low_m, keep.high_m)) - _half(keep.low_m, keep.high_m)
+    return np.linalg.norm(np.maximum(past, 0.0), axis=1) + np.minimum(past.max(axis=1), 0.0) - keep.radius_m
+
+
+def _accelerations(course: Course) -> Array:
+    """Return the change of speed over one tick of commands, per second, where nothing but the servo moves the arm.
+
+    Set-points come once a tick and the servo follows each in a few steps of physics, so that the instant's acceleration
+    ripples; a command has no say in less than a tick. In contact, and while the plant runs its own stop, other limits
+    hold: forces, and distance and time of a stop.
+
+    Returns:
+        (n, 6), zero where it is not judged.
+    """
+    n = course.n_substeps
+    if course.n_steps <= n:
+        return np.empty((0, 6))
+    rate = np.abs(course.qd_rad_s[n:] - course.qd_rad_s[:-n]) / (n * course.physics_s)
+    return np.where(_near(course, course.stopping | _pressed(course))[n:, None], 0.0, rate)
+
+
+def _pressed(course: Course) -> NDArray[np.bool_]:
+    """Return when the arm touched anything but what it holds lightly.  () -> (n,)"""
+    pressed = np.zeros(course.n_steps, dtype=bool)
+    pressed[[t.step for t in course.touches if t.other is not PartKind.OBJECT or t.force_n > HARD_N]] = True
+    return pressed
+
+
+def _finger_speeds(course: Course) -> Array:
+    """Return how fast the opening changed, over spans in which the fingers' own ringing about their ramp cancels.
+
+    Fingers that touched something are moved by what they hold, and snap shut when they lose it: zero there.
+
+    Returns:
+        (n,)
+    """
+    n = round(RINGING_S / course.physics_s)
+    touching = np.zeros(course.n_steps, dtype=bool)
+    touching[[t.step for t in course.touches if t.own is PartKind.FINGERS]] = True
+    touching |= course.stopping  # and a table that is laid out anew after a stop opens the hand at once
+    speed = np.abs(course.opening_m[n:] - course.opening_m[:-n]) / RINGING_S
+    return np.where(_near(course, touching)[n:], 0.0, speed)
+
+
+def _near(course: Course, when: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Return whether something was so at a step or a short while before it.  (n,) -> (n,)"""
+    calm = round(CALM_S / course.physics_s) + course.n_substeps
+    return np.convolve(when, np.ones(calm), mode="full")[: course.n_steps] > 0.0
+
+
+def _stops(course: Course, profile: Profile) -> Iterator[Reading]:
+    """Read how long and how far the plant's own stops were, each from its first step to rest."""
+    if not course.stopping.any():
+        return
+    begins = np.flatnonzero(np.diff(np.concatenate([[False], course.stopping]).astype(np.int8)) == 1)
+    longest, farthest = 0.0, 0.0
+    for begin in begins.tolist():
+        running = course.stopping[begin:]
+        end = begin + (int(np.argmin(running)) if not running.all() else len(running))
+        moving = np.flatnonzero(course.speed_m_s[begin:end].max(axis=1) > REST_M_S)
+        last = int(moving[-1]) + 1 if len(moving) else 0
+        longest = max(longest, last * course.physics_s)
+        path = np.diff(course.position_m[begin : min(begin + last + 1, end), 0], axis=0)
+        farthest = max(farthest, float(np.linalg.norm(path, axis=1).sum()))
+    stopping, at_s = profile.stopping, float(begins[0]) * course.physics_s
+    yield Reading(limit="stop_time", share=1.0 - longest / stopping.time_s, value=longest, at_s=at_s)
+    yield Reading(limit="stop_distance", share=1.0 - farthest / stopping.distance_m, value=farthest, at_s=at_s)

@@ -1,0 +1,112 @@
+import itertools
+import math
+
+import numpy as np
+import pytest
+
+from robot.messages import GripCommand, Heading, Hold, JointTarget, Twist
+from robot.safety.checks import check_intent
+from robot.teleop import Arena, Battery, Seen, Send, Silence, Write
+from robot.teleop.battery import FAMILIES
+from robot.teleop.human import minimum_jerk
+from robot.teleop.search import Candidates, played
+
+HOME = (2.8186, -1.7634, 2.014, -1.8213, -1.5708, -1.8938)
+GRIP = GripCommand(opening_m=0.085, force_n=235.0, speed_m_s=0.15)
+ARENA = Arena(
+    tick_s=0.01, speed_m_s=0.25, box_m=((0.24, -0.36, 0.015), (0.64, 0.36, 0.32)), q_min_rad=(-6.28,) * 6,
+    q_max_rad=(6.28,) * 6, qd_max_rad_s=(1.0,) * 6, home_rad=HOME, things_m=((0.3, 0.0, 0.05), (0.5, 0.2, 0.12)),
+    loose_m=((0.54, 0.25, 0.04),), fences_m=((0.0, 0.0, 0.0),), grip=(GRIP, GRIP),
+)  # fmt: skip
+BATTERY = Battery(seed=3, n_streams=300, n_plants=6)
+HOSTILE = ("not_finite", "malformed")
+N = 250
+
+
+def still() -> Seen:
+    return Seen(q_rad=HOME, tcp_m=(0.4, 0.0, 0.2), force_n=(0.0, 0.0, 0.0))
+
+
+def asks(family: str, seed: int = 0, n: int = N) -> list:
+    return list(itertools.islice(FAMILIES[family](still, ARENA, np.random.default_rng(seed)), n))
+
+
+@pytest.mark.parametrize("family", sorted(FAMILIES))
+def test_the_same_seed_is_the_same_stream_and_another_is_another(family):
+    assert repr(asks(family)) == repr(asks(family))
+    assert repr(asks(family)) != repr(asks(family, seed=1))
+
+
+@pytest.mark.parametrize("family", sorted(FAMILIES))
+def test_a_stream_never_ends_and_asks_only_what_can_be_asked(family):
+    came = asks(family)
+    assert len(came) == N
+    assert all(isinstance(ask, Send | Silence | Write) for ask in came)
+
+
+@pytest.mark.parametrize("family", sorted(set(FAMILIES) - set(HOSTILE)))
+def test_streams_that_are_not_meant_to_be_refused_send_intents_that_are_admitted(family):
+    intents = [ask.intent for ask in asks(family) if isinstance(ask, Send)]
+    assert [check_intent(intent) for intent in intents if check_intent(intent) is not None] == []
+
+
+@pytest.mark.parametrize("family", HOSTILE)
+def test_hostile_streams_send_what_must_be_refused_within_a_stream(family):
+    assert any(check_intent(ask.intent) is not None for ask in asks(family) if isinstance(ask, Send))
+
+
+def test_all_kinds_of_intent_and_both_grips_are_sent():
+    kinds = {type(ask.intent) for f in FAMILIES for ask in asks(f) if isinstance(ask, Send)}
+    assert {Heading, Twist, JointTarget, Hold} <= kinds
+    grips = {getattr(ask.intent, "grip", None) for f in ("mixed", "grasps") for ask in asks(f)}
+    assert len(grips) == 3
+
+
+def test_commands_to_the_gate_run_backwards_in_number_and_in_time():
+    writes = [ask for ask in asks("backwards", n=2000) if isinstance(ask, Write)]
+    assert {w.sequence_off for w in writes} >= {0, -1, -7, 1}
+    assert min(w.stamp_off_ns for w in writes) < 0 < max(w.stamp_off_ns for w in writes)
+
+
+def test_a_minimum_jerk_reach_covers_its_length_at_rest_at_both_ends():
+    n = 1000
+    assert sum(minimum_jerk((k + 0.5) / n) for k in range(n)) / n == pytest.approx(1.0, abs=1e-6)
+    assert minimum_jerk(0.0) == minimum_jerk(1.0) == minimum_jerk(-0.5) == minimum_jerk(1.5) == 0.0
+    assert max(minimum_jerk(k / n) for k in range(n)) == pytest.approx(1.875)
+
+
+def test_a_person_stays_below_the_speed_that_is_allowed_but_for_tremor():
+    twists = [ask.intent for ask in asks("reaches", n=3000) if isinstance(ask.intent, Twist)]
+    speeds = [math.hypot(*t.linear_m_s) for t in twists]
+    assert 0.3 * ARENA.speed_m_s < max(speeds) < ARENA.speed_m_s
+
+
+def test_every_number_has_one_place_and_families_meet_every_plant():
+    places = [BATTERY.place(k) for k in range(BATTERY.n_plain)]
+    assert {(p.family, p.plant) for p in places} == set(itertools.product(FAMILIES, range(6)))
+    blocks = BATTERY.searches()
+    assert [b.first for b in blocks] == list(range(BATTERY.n_plain, 300, Candidates.BLOCK))
+    assert sum(b.n_streams for b in blocks) + BATTERY.n_plain == 300
+
+
+def test_streams_of_different_numbers_are_drawn_apart():
+    draws = {BATTERY.rng(k).integers(1 << 60) for k in range(300)}
+    assert len(draws) == 300
+    assert Battery(seed=4, n_streams=300, n_plants=6).rng(0).integers(1 << 60) not in draws
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_search_comes_nearer_to_what_scores_low(seed):
+    candidates, scores = Candidates(np.random.default_rng(seed)), []
+    for _ in range(Candidates.BLOCK):
+        knots = candidates.propose()
+        scores.append(float(np.abs(knots - 1.5).mean()))
+        candidates.learn(knots, scores[-1])
+    assert min(scores) < min(scores[:8]) - 0.02
+
+
+def test_a_candidate_is_always_played_the_same():
+    knots = Candidates(np.random.default_rng(0)).propose()
+    first, again = (list(itertools.islice(played(knots, still, ARENA), 400)) for _ in range(2))
+    assert first == again
+    assert {type(ask.intent) for ask in first} == {Twist, JointTarget}

@@ -1,0 +1,159 @@
+"""Arming ends with what it was for: its source, its profile, its lease. On a whole station."""
+
+import pytest
+
+from config.rig import PlantExpected
+from robot.errors import NotEngagedError, SafetyError
+from robot.hal.fake import FakePlant
+from robot.local_station import LocalStation
+from robot.messages import Hold, PlantIdentity, PlantKind, StationMode, Twist
+from robot.rigs import build_station
+from robot.safety import Arming, Grant
+from sim_twin.operator import SimulatedOperator
+from tests.support.stations import fake_rig
+
+LIFE_NS = 500_000_000
+GRANT = Grant(source="teleop", profile="attended", lease=1)
+IDENTITY = PlantIdentity(kind=PlantKind.FAKE, model="ur5e", serial="fake")
+
+
+class HostTime:
+    now_ns = 0
+
+    def __call__(self):
+        return self.now_ns
+
+
+@pytest.fixture
+def world():
+    """A station of a teleoperator's, engaged, with its plant and its host's clock."""
+    resolved, host = fake_rig(), HostTime()
+    plant = FakePlant(arm=resolved.arm, scenario=resolved.scenario, rig=resolved.rig)
+    station = build_station(resolved, plant=plant, host_ns=host)
+    station.take_lease("teleop", life_ns=LIFE_NS)
+    SimulatedOperator().arm_once(station)
+    yield station, plant, host
+    station.close()
+
+
+def test_the_state_names_who_it_is_armed_for_and_with_which_limits(world):
+    station, _, _ = world
+    state = station.state
+    assert (state.mode, state.source, state.profile) == (StationMode.ENGAGED, "teleop", fake_rig().rig.profile)
+
+
+def test_every_step_renews_the_lease(world):
+    station, _, host = world
+    for _ in range(5):
+        host.now_ns += LIFE_NS
+        assert not station.step(Hold()).is_void
+    assert station.state.mode is StationMode.ENGAGED
+
+
+def test_a_source_that_was_gone_for_longer_than_its_lease_finds_the_arm_stopped_and_disarmed(world):
+    station, plant, host = world
+    station.step(Twist(linear_m_s=(0.1, 0.0, 0.0)))
+    host.now_ns += LIFE_NS + 1
+    n_stops = plant.arm.n_stops
+    with pytest.raises(NotEngagedError, match="no lease is in force"):
+        station.step(Twist(linear_m_s=(0.1, 0.0, 0.0)))
+    assert station.state.mode is StationMode.DISARMED
+    assert "teleop" in station.state.reason
+    assert plant.arm.n_stops > n_stops
+
+
+def test_looking_at_the_state_is_enough_to_see_it(world):
+    station, _, host = world
+    host.now_ns += LIFE_NS + 1
+    assert station.state.mode is StationMode.DISARMED
+
+
+def test_after_an_expiry_it_must_be_armed_anew(world):
+    station, _, host = world
+    host.now_ns += LIFE_NS + 1
+    with pytest.raises(NotEngagedError):
+        station.step(Hold())
+    with pytest.raises(SafetyError):
+        station.engage()
+    SimulatedOperator().arm_once(station)
+    assert not station.step(Hold()).is_void
+
+
+def test_a_hand_over_stops_the_arm_and_disarms(world):
+    station, plant, _ = world
+    n_stops = plant.arm.n_stops
+    station.hand_over("learner")
+    assert plant.arm.n_stops > n_stops
+    with pytest.raises(NotEngagedError, match="now there is learner"):
+        station.step(Hold())
+    SimulatedOperator().arm_once(station)
+    assert station.state.source == "learner"
+
+
+def test_nobody_else_gets_the_lease_but_anybody_may_stop(world):
+    station, plant, _ = world
+    with pytest.raises(SafetyError, match="teleop has it"):
+        station.take_lease("learner")
+    assert station.state.mode is StationMode.ENGAGED
+    n_stops = plant.arm.n_stops
+    station.stop(by="somebody who saw a hand")
+    assert plant.arm.n_stops > n_stops
+    assert station.state.mode is StationMode.LATCHED
+    assert station.state.reason == "stopped by somebody who saw a hand"
+    assert station.n_latches == 1
+
+
+def test_a_stop_of_what_is_only_armed_disarms_it(world):
+    station, _, _ = world
+    station.hand_over("learner")
+    station.arm(by="tester")
+    station.stop(by="tester")
+    assert station.state.mode is StationMode.DISARMED
+
+
+def test_a_hand_over_of_nothing_is_refused():
+    station = build_station(fake_rig())
+    with pytest.raises(SafetyError, match="nobody has it"):
+        station.hand_over("learner")
+
+
+@pytest.mark.parametrize(
+    "now",
+    [
+        None,
+        Grant(source="learner", profile="attended", lease=1),
+        Grant(source="teleop", profile="unattended", lease=1),
+        Grant(source="teleop", profile="attended", lease=2),
+    ],
+)
+@pytest.mark.parametrize("is_engaged", [False, True])
+def test_arming_ends_with_its_source_its_profile_and_its_lease_each_alone(now, is_engaged):
+    arming = Arming(expected=PlantExpected(kind="fake", model="ur5e", serial="fake"), max_latches=9, latch_window=9)
+    arming.arm(identity=IDENTITY, by="tester", grant=GRANT)
+    if is_engaged:
+        arming.engage()
+    arming.hold_to(GRANT)
+    assert arming.state.mode is (StationMode.ENGAGED if is_engaged else StationMode.ARMED)
+    arming.hold_to(now)
+    assert arming.state.mode is StationMode.DISARMED
+
+
+def test_a_latch_is_not_lost_when_what_it_was_armed_for_ends(world):
+    station, _, host = world
+    station.stop(by="tester")
+    host.now_ns += LIFE_NS + 1
+    assert station.state.mode is StationMode.LATCHED
+
+
+def test_a_wait_for_a_reset_does_not_cost_the_lease(world):
+    station, plant, host = world
+    lay_out = plant.resetter.reset
+
+    def slow(**layout):
+        host.now_ns += 100 * LIFE_NS
+        lay_out(**layout)
+
+    plant.resetter.reset = slow
+    station.reset(seed=1, epoch=0)
+    assert station.state.mode is StationMode.ENGAGED
+    assert isinstance(station, LocalStation)

@@ -1,0 +1,368 @@
+"""Every kind of breach is brought about on the physics itself and must be seen; just inside the limit it must not."""
+
+import msgspec
+import mujoco
+import numpy as np
+import pytest
+
+from config.limits import ArmPart, KeepOut, Plane, Profile, Touched
+from config.loader import resolve
+from sim_twin.allowances import allowances_for
+from sim_twin.monitor import Monitor
+from sim_twin.names import on_table
+from sim_twin.perturb import NOMINAL, PERTURBATIONS, perturbed_plant
+from sim_twin.readings import Reading
+from sim_twin.recorder import PartKind, Recorder, part_kinds
+
+replace = msgspec.structs.replace
+N_TICKS = 150
+
+
+@pytest.fixture(scope="module")
+def resolved():
+    return resolve(rig="twin")
+
+
+class Stage:
+    """A twin whose physics is set by hand, recorded, and judged."""
+
+    def __init__(self, resolved) -> None:
+        self.plant = perturbed_plant(resolved, NOMINAL)
+        attended = resolved.limits.profile("attended")
+        joints = tuple(
+            replace(j, speed_rad_s=1.0, acceleration_rad_s2=10.0, jerk_rad_s3=400.0) for j in attended.joints
+        )
+        self.world, self.profile = self.plant.world, replace(attended, joints=joints)
+        self.recorder = Recorder(self.world, most_ticks=N_TICKS)
+        self.plant.arm.connect()
+        self.lay_out()
+
+    def lay_out(self, digital_out: int = 0) -> None:
+        self.plant.resetter.reset(seed=0, epoch=0, digital_out=digital_out)
+        self.recorder.clear()
+
+    @property
+    def data(self) -> mujoco.MjData:
+        return self.world.data
+
+    def put(self, q=None, qd=None) -> None:
+        if q is not None:
+            self.data.qpos[:6] = q
+            self.data.ctrl[self.world.joint_controls] = q
+        self.data.qvel[:6] = 0.0 if qd is None else qd
+
+    def tick(self, n: int = 1) -> None:
+        for _ in range(n):
+            self.world.advance()
+
+    def judge(self, profile: Profile | None = None) -> dict[str, Reading]:
+        held = profile or self.profile
+        monitor = Monitor(self.world, held, allowances_for(held, NOMINAL))
+        return {r.limit: r for r in monitor.judge(self.recorder.course())}
+
+
+@pytest.fixture(scope="module")
+def made(resolved):
+    return Stage(resolved)
+
+
+@pytest.fixture
+def stage(made):
+    made.lay_out()
+    return made
+
+
+def test_an_arm_at_rest_breaks_nothing(stage):
+    stage.tick(20)
+    assert [r for r in stage.judge().values() if r.is_broken] == []
+
+
+def test_nothing_recorded_is_nothing_judged(stage):
+    assert stage.judge() == {}
+
+
+@pytest.mark.parametrize("joint", range(6))
+@pytest.mark.parametrize(("beyond", "is_seen"), [(-0.01, False), (0.02, True)])
+def test_a_joint_beyond_its_range_is_seen(stage, joint, beyond, is_seen):
+    q = stage.data.qpos[:6].copy()
+    joints = tuple(
+        replace(j, range_rad=(q[i] - 1.0, q[i] + (1.0 if i != joint else -beyond)), soft_margin_rad=0.0)
+        for i, j in enumerate(stage.profile.joints)
+    )
+    stage.tick(3)
+    came = stage.judge(replace(stage.profile, joints=joints))["joint_range"]
+    assert came.is_broken is is_seen
+    assert came.detail == f"#{joint + 1}"
+
+
+@pytest.mark.parametrize("joint", range(6))
+def drive(stage: Stage, joint: int, speed: float, n: int = 90) -> None:
+    """Let a joint's set-point run up to a speed gently and on."""
+    at = float(stage.data.ctrl[stage.world.joint_controls[joint]])
+    for k in range(n):
+        at += 0.01 * speed * 0.5 * (1.0 - np.cos(np.pi * min(k / 50, 1.0)))
+        stage.data.ctrl[stage.world.joint_controls[joint]] = at
+        stage.tick()
+
+
+@pytest.mark.parametrize("joint", range(6))
+@pytest.mark.parametrize(("share", "is_seen"), [(0.999, False), (1.01, True)])
+def test_a_joint_that_is_too_fast_is_seen(stage, joint, share, is_seen):
+    most = stage.profile.joints[joint].speed_rad_s
+    drive(stage, joint, share * most, 65)  # before the arm meets anything
+    assert stage.judge()["command_speed"].is_broken is is_seen
+
+
+@pytest.mark.parametrize(("share", "is_seen"), [(1.1, False), (1.3, True)])
+def test_a_joint_that_is_faster_than_a_servo_explains_is_seen(stage, share, is_seen):
+    drive(stage, 5, share * stage.profile.joints[5].speed_rad_s, 65)
+    assert stage.judge()["joint_speed"].is_broken is is_seen
+
+
+@pytest.mark.parametrize(("share", "is_seen"), [(0.5, False), (1.5, True)])
+def test_a_speed_that_changes_too_fast_is_seen(stage, share, is_seen):
+    most = stage.profile.joints[5].acceleration_rad_s2
+    speed, at = 0.0, float(stage.data.qpos[5])
+    control = stage.world.joint_controls[5]
+    for _ in range(25):
+        speed += share * most * 0.01
+        at += speed * 0.01
+        stage.data.ctrl[control] = at
+        stage.tick()
+    came = stage.judge()
+    assert came["command_acceleration"].is_broken is is_seen
+    assert came["joint_acceleration"].is_broken is is_seen
+
+
+@pytest.mark.parametrize(("name", "key"), [("tcp", "tcp_m_s"), ("flange", "flange_m_s"), ("elbow", "elbow_m_s")])
+def test_the_speed_that_a_set_point_asks_of_a_point_is_held_to_the_limit(stage, name, key):
+    drive(stage, 0, 0.5, 60)
+    asked = stage.judge()[f"command_{name}_speed"].value
+    place = {"tcp": 0, "flange": 1, "elbow": 2}[name]
+    radius = np.linalg.norm(stage.recorder.course().position_m[0, place, :2])
+    assert asked == pytest.approx(0.5 * radius, rel=1e-3)
+    for share, is_seen in ((1.001, False), (0.99, True)):
+        speeds = replace(stage.profile.speeds, **{key: share * asked})
+        assert stage.judge(replace(stage.profile, speeds=speeds))[f"command_{name}_speed"].is_broken is is_seen
+
+
+def test_a_set_point_that_jumps_is_seen_though_the_joint_lags(stage):
+    stage.tick(3)
+    stage.data.ctrl[stage.world.joint_controls[0]] += 0.011
+    stage.tick(3)
+    came = stage.judge()
+    assert came["command_speed"].is_broken
+    assert came["command_jerk"].is_broken
+
+
+@pytest.mark.parametrize(("name", "key"), [("tcp", "tcp_m_s"), ("flange", "flange_m_s"), ("elbow", "elbow_m_s")])
+def test_the_speed_of_a_point_is_the_physics_own(stage, name, key):
+    drive(stage, 0, 0.5, 60)
+    course = stage.recorder.course()
+    place = {"tcp": 0, "flange": 1, "elbow": 2}[name]
+    moved = np.diff(course.position_m[:, place], axis=0) / course.physics_s
+    assert course.speed_m_s[1:, place] == pytest.approx(np.linalg.norm(moved, axis=1), abs=0.006)
+    fastest = float(course.speed_m_s[:, place].max())
+    for share, is_seen in ((0.9, False), (0.75, True)):
+        speeds = replace(stage.profile.speeds, **{key: share * fastest})
+        assert stage.judge(replace(stage.profile, speeds=speeds))[f"{name}_speed"].is_broken is is_seen
+
+
+@pytest.mark.parametrize("axis", range(3))
+@pytest.mark.parametrize("side", [-1, 1])
+def test_a_tool_outside_a_box_is_seen(stage, axis, side):
+    stage.tick(3)
+    at = stage.recorder.course().position_m[-1, 0]
+    for off, is_seen in ((0.003, False), (-0.003, True)):
+        low, high = at - 0.1, at + 0.1
+        (low if side < 0 else high)[axis] = at[axis] + side * off
+        (box,) = stage.profile.workspace.boxes
+        box = replace(box, low_m=tuple(low), high_m=tuple(high))
+        space = replace(stage.profile.workspace, boxes=(box,))
+        came = stage.judge(replace(stage.profile, workspace=space))[f"box:{box.name}"]
+        assert came.is_broken is is_seen
+
+
+@pytest.mark.parametrize("part", list(ArmPart))
+def test_each_part_of_the_arm_is_held_by_planes_and_keep_outs(stage, part):
+    stage.tick(3)
+    at = stage.recorder.course().position_m[-1, {"tcp": 0, "flange": 1, "elbow": 2}[part]]
+    for off, is_seen in ((0.003, False), (-0.003, True)):
+        place = (float(at[0]), float(at[1]), float(at[2]) - off)
+        ball = (place[0], place[1], place[2] - 0.1)
+        space = replace(
+            stage.profile.workspace,
+            planes=(Plane(name="here", point_m=place, normal=(0.0, 0.0, 2.0), parts=(part,)),),
+            keep_outs=(KeepOut(name="ball", low_m=ball, high_m=ball, radius_m=0.1, parts=(part,)),),
+        )
+        came = stage.judge(replace(stage.profile, workspace=space))
+        assert came["plane:here"].is_broken is is_seen
+        assert came["keep_out:ball"].is_broken is is_seen
+
+
+@pytest.mark.parametrize(("tilt", "is_seen"), [(0.75, False), (0.82, True)])
+def test_a_tool_tilted_out_of_its_cone_is_seen(stage, tilt, is_seen):
+    q = stage.data.qpos[:6].copy()
+    q[3] += tilt
+    stage.put(q)
+    stage.tick(3)
+    came = stage.judge()["tool_cone"]
+    assert came.value == pytest.approx(tilt, abs=0.01)
+    assert came.is_broken is is_seen
+
+
+def press(stage: Stage, name: str, depth_m: float = 0.004) -> None:
+    """Bring the fingertips down on a thing, straight."""
+    x, y, z = stage.data.xpos[stage.world.model.body(on_table(name)).id]
+    top = next(t.height_m for t in (*stage.world.scenario.buttons, *stage.world.scenario.boxes) if t.name == name)
+    kinematics = stage.plant.resetter._kinematics
+    over = (float(x), float(y), float(z) + top + 0.015 - depth_m)
+    stage.put(kinematics.solve(over, stage.world.arm.home_rad))
+
+
+def test_fingers_on_a_button_are_allowed_and_without_the_pair_a_breach(stage):
+    press(stage, "green_button")
+    stage.tick(10)
+    assert not stage.judge()["contact_pair"].is_broken
+    contacts = tuple(c for c in stage.profile.contacts if c.thing is not Touched.BUTTON)
+    came = stage.judge(replace(stage.profile, contacts=contacts))
+    assert came["contact_pair"].is_broken
+    assert "fingers on table/green_button" in came["contact_pair"].detail
+    assert came["scene_clearance"].is_broken
+
+
+def test_the_force_of_a_pair_is_the_physics_own(stage):
+    press(stage, "green_button")
+    stage.tick(10)
+    pushed = stage.judge()["force:fingers-button"].value
+    assert pushed > 1.0
+    for share, is_seen in ((1.01, False), (0.98, True)):
+        contacts = tuple(replace(c, force_n=share * pushed) for c in stage.profile.contacts)
+        assert stage.judge(replace(stage.profile, contacts=contacts))["force:fingers-button"].is_broken is is_seen
+
+
+def test_a_force_that_lasts_is_told_from_a_blow(stage):
+    press(stage, "green_button")
+    stage.tick(10)
+    came = stage.judge()
+    assert came["blow"].value >= came["steady_force"].value > 1.0
+    force = replace(stage.profile.contact_force, steady_n=0.9 * came["steady_force"].value)
+    assert stage.judge(replace(stage.profile, contact_force=force))["steady_force"].is_broken
+    force = replace(stage.profile.contact_force, blow_n=0.9 * came["blow"].value)
+    assert stage.judge(replace(stage.profile, contact_force=force))["blow"].is_broken
+
+
+def test_fingers_on_the_bare_table_are_a_breach(stage):
+    kinematics = stage.plant.resetter._kinematics
+    stage.put(kinematics.solve((0.42, 0.1, 0.013), stage.world.arm.home_rad))
+    stage.tick(5)
+    came = stage.judge()
+    assert came["contact_pair"].is_broken
+    assert came["contact_pair"].detail == "fingers on world"
+
+
+@pytest.mark.parametrize(("off", "is_seen"), [(-0.0005, False), (0.003, True)])
+def test_a_clearance_is_the_physics_own_distance(stage, off, is_seen):
+    stage.tick(3)
+    near = stage.judge()["scene_clearance"].value
+    clearances = replace(stage.profile.clearances, scene_m=near + off)
+    assert stage.judge(replace(stage.profile, clearances=clearances))["scene_clearance"].is_broken is is_seen
+
+
+def test_an_arm_folded_into_itself_is_seen_though_the_physics_lets_it_through(stage):
+    q = stage.data.qpos[:6].copy()
+    q[2], q[3] = 2.9, 0.0
+    stage.put(q)
+    stage.tick(1)
+    came = stage.judge()["self_clearance"]
+    assert came.is_broken
+    assert came.value < 0.0
+
+
+@pytest.mark.parametrize(("speed", "is_seen"), [(0.14, False), (0.16, True)])
+def test_fingers_that_are_too_fast_are_seen(stage, speed, is_seen):
+    stage.world.opening_goal_m, stage.world.grip_speed_m_s = 0.0, speed
+    stage.tick(40)
+    assert stage.judge()["grip_speed"].is_broken is is_seen
+
+
+def test_a_hand_that_presses_too_hard_is_seen(stage):
+    stage.world.limit_grip(300.0)
+    stage.data.ctrl[stage.world.grip_control] = 0.0
+    stage.world.opening_asked_m = stage.world.opening_goal_m = 0.0
+    stage.tick(1)
+    assert stage.judge()["grip_force"].is_broken
+
+
+def test_fingers_wider_than_allowed_are_seen(stage):
+    stage.tick(3)
+    grip = replace(stage.profile.grip, opening_m=(0.0, 0.08))
+    assert stage.judge(replace(stage.profile, grip=grip))["grip_opening"].is_broken
+    assert not stage.judge()["grip_opening"].is_broken
+
+
+def test_a_stop_is_timed_and_measured_to_rest(stage):
+    drive(stage, 0, 0.9)
+    stage.plant.arm.stop()
+    stage.tick(40)
+    came = stage.judge()
+    assert 0.03 < came["stop_time"].value < 0.2
+    assert 0.005 < came["stop_distance"].value < 0.1
+    stopping = replace(stage.profile.stopping, time_s=0.9 * came["stop_time"].value)
+    assert stage.judge(replace(stage.profile, stopping=stopping))["stop_time"].is_broken
+    stopping = replace(stage.profile.stopping, distance_m=0.9 * came["stop_distance"].value)
+    assert stage.judge(replace(stage.profile, stopping=stopping))["stop_distance"].is_broken
+
+
+def test_every_solid_thing_of_the_scene_has_a_kind(stage):
+    model, kinds = stage.world.model, part_kinds(stage.world)
+    solid = [k for i, k in enumerate(kinds) if model.geom_contype[i] or model.geom_conaffinity[i]]
+    assert PartKind.OTHER not in solid
+    assert set(PartKind) - {PartKind.OTHER} == set(solid)
+
+
+def test_recording_changes_nothing_of_the_physics(resolved, stage):
+    plain = perturbed_plant(resolved, NOMINAL)
+    plain.arm.connect()
+    plain.resetter.reset(seed=0, epoch=0, digital_out=0)
+    for world in (plain.world, stage.world):
+        world.data.ctrl[world.joint_controls[0]] += 0.05
+        for _ in range(20):
+            world.advance()
+    assert (plain.world.data.qpos == stage.data.qpos).all()
+
+
+@pytest.mark.parametrize("by", PERTURBATIONS[1:], ids=lambda p: p.name)
+def test_a_perturbed_plant_differs_in_what_it_says_and_nobody_is_told(resolved, by):
+    nominal, other = perturbed_plant(resolved, NOMINAL), perturbed_plant(resolved, by)
+    assert other.arm.spec == nominal.arm.spec
+    assert other.identity == nominal.identity
+    ends = []
+    for plant in (nominal, other):
+        plant.arm.connect()
+        world = plant.world
+        world.data.qpos[:6] = world.data.ctrl[world.joint_controls] = world.arm.home_rad
+        world.data.qvel[:6] = 0.0
+        for k in range(60):
+            world.data.ctrl[world.joint_controls[0]] += 0.005 * (k < 30)
+            if k == 25 and by.braking_factor != 1.0:
+                plant.arm.stop()
+            world.advance()
+            if k == 27 and by.lag_factor != 1.0:
+                break
+        ends.append(np.array(plant.arm.read().tcp_position_m))
+    apart = float(np.linalg.norm(ends[1] - ends[0]))
+    assert 2e-4 < apart < 0.05
+
+
+def test_a_payload_that_is_not_compensated_makes_the_tool_droop_and_one_that_is_absent_makes_it_rise(resolved):
+    heights = {}
+    for by in PERTURBATIONS:
+        if by.payload_kg or by is NOMINAL:
+            plant = perturbed_plant(resolved, by)
+            plant.arm.connect()
+            for _ in range(60):
+                plant.world.advance()
+            heights[by.payload_kg] = plant.arm.read().tcp_position_m[2]
+    assert heights[1.0] < heights[0.0] - 2e-4 < heights[0.0] + 2e-4 < heights[-1.0]
+    assert heights[-1.0] - heights[1.0] < 0.01

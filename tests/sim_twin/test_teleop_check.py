@@ -1,0 +1,225 @@
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import msgspec
+import pytest
+from typer.testing import CliRunner
+
+from config.loader import resolve
+from robot.cli import app as root
+from robot.messages import Hold, Twist
+from robot.teleop import Send, Silence, Write
+from robot.teleop.cli import CHECKERS
+from robot.teleop.cli import app as teleop
+from sim_twin.checking.check import FULL_STREAMS, N_COMMANDS, Setup, check_streams, part_of, rerun
+from sim_twin.checking.mutations import MUTATIONS, try_mutation
+from sim_twin.checking.report import CheckReport
+from sim_twin.checking.ring import Ring, StreamResult
+from sim_twin.checking.tally import Tally
+from sim_twin.perturb import NOMINAL, PERTURBATIONS
+from sim_twin.readings import Reading
+
+SHORT = 40
+SOUND = {"joint range", "tcp speed", "flange speed", "box", "plane", "keep-out", "tool cone", "grip speed"}
+"""Limits that the stack holds when they bind, and that streams reach."""
+
+
+@pytest.fixture(scope="module")
+def resolved():
+    return resolve(rig="twin")
+
+
+def setup_of(resolved, **values) -> Setup:
+    return Setup(resolved=resolved, profile=resolved.profile, seed=0, **values)
+
+
+@pytest.fixture(scope="module")
+def ring(resolved):
+    made = Ring(resolved, NOMINAL, resolved.profile, n_commands=SHORT)
+    yield made
+    made.close()
+
+
+def run(ring: Ring, asks) -> StreamResult:
+    return ring.run(lambda look, arena: iter(asks), number=0, family="test", seed=0)
+
+
+def test_the_whole_battery_is_as_long_as_it_must_be_and_meets_every_plant(resolved):
+    blocks = part_of(setup_of(resolved), full=True)
+    assert sum(b.n_streams for b in blocks) == FULL_STREAMS >= 3000
+    assert FULL_STREAMS * N_COMMANDS >= 1_000_000
+    assert {b.plant for b in blocks if b.search is None} == set(range(len(PERTURBATIONS)))
+    numbers = [n for b in blocks for n in b.numbers]
+    assert len(set(numbers)) == len(numbers)
+
+
+def test_the_default_is_a_tenth_drawn_by_the_seed(resolved):
+    part = part_of(setup_of(resolved), full=False)
+    assert FULL_STREAMS / 11 < sum(b.n_streams for b in part) < FULL_STREAMS / 8
+    assert part == part_of(setup_of(resolved), full=False)
+    other = part_of(msgspec.structs.replace(setup_of(resolved), seed=1), full=False)
+    assert {b.numbers for b in part} != {b.numbers for b in other}
+    assert {b.plant for b in part} == set(range(len(PERTURBATIONS)))
+
+
+def test_a_stream_alone_is_the_same_as_among_others(resolved):
+    setup = setup_of(resolved, n_commands=SHORT)
+    heard: list[StreamResult] = []
+    block = next(b for b in part_of(setup, full=False) if b.search is None)
+    check_streams(setup, (block,), n_workers=1, heard=heard.extend)
+    assert [came.number for came in heard] == list(block.numbers)
+    again, _ = rerun(setup, block.numbers[-1])
+    assert again == heard[-1]
+
+
+def test_a_stream_of_a_search_is_found_again(resolved):
+    setup = setup_of(resolved, n_commands=SHORT)
+    block = next(b for b in part_of(setup, full=True) if b.search is not None)
+    heard: list[StreamResult] = []
+    check_streams(setup, (block,), n_workers=1, heard=heard.extend)
+    again, _ = rerun(setup, block.search.first + 9)
+    assert again == heard[9]
+
+
+def test_a_stream_that_is_not_there_is_refused(resolved):
+    with pytest.raises(ValueError, match="expected a stream from 0 to"):
+        rerun(setup_of(resolved), FULL_STREAMS)
+
+
+def test_commands_are_counted_and_a_latched_station_is_asked_on_in_vain(ring):
+    fast = Send(Twist(linear_m_s=(0.1, 0.0, 0.0)))
+    came = run(ring, [fast] * 5 + [Send(None)] + [fast] * SHORT)
+    assert came.n_commands == SHORT
+    assert came.n_latches == 1
+
+
+def test_silence_comes_to_rest_and_is_timed(ring):
+    came = run(ring, [Send(Twist(linear_m_s=(0.3, 0.0, 0.0)))] * 30 + [Silence(60)])
+    assert came.n_latches == 0
+    assert 50.0 < came.rest_ms < 600.0
+
+
+def test_a_command_past_all_shaping_meets_the_gate(ring):
+    q = ring.look().q_rad
+    came = run(ring, [Write(q_rad=(q[0] + 1.0, *q[1:]))] + [Send(Hold())] * 5)
+    assert came.n_latches == 1
+    came = run(ring, [Write(q_rad=ring.look().q_rad, stamp_off_ns=-(10**9))])
+    assert came.n_latches == 1
+
+
+def reading(limit="tcp_speed", share=0.1, broken=False) -> Reading:
+    return Reading(limit=limit, share=share, value=1.0, is_broken=broken)
+
+
+def result(number: int, *readings: Reading) -> StreamResult:
+    return StreamResult(number=number, family="f", plant="nominal", n_commands=7, n_latches=1, readings=readings)
+
+
+def test_a_tally_keeps_the_worst_of_each_limit_and_counts_streams_that_broke_it():
+    tally = Tally()
+    tally.add(result(1, reading(share=0.2), reading("box", -0.3, broken=True)))
+    tally.add(result(2, reading(share=-0.1, broken=True), reading("box", -0.2, broken=True)))
+    tally.add(result(3, reading(share=0.5)))
+    assert [(r.limit, r.worst_margin_share, r.stream, r.violations) for r in tally.rows] == [
+        ("box", -0.3, 1, 2),
+        ("tcp_speed", -0.1, 2, 1),
+    ]
+    assert (tally.n_streams, tally.n_commands, tally.n_violations) == (3, 21, 3)
+    assert [r.ok for r in tally.results()] == [True, True, False, True, True, True]
+    assert [b.stream for b in tally.breaches] == [1, 2, 2]
+
+
+def ask(*words: str):
+    return CliRunner().invoke(teleop, ["check", *words])
+
+
+def test_a_short_check_answers_one_object_and_its_exit_code_says_what_came(tmp_path):
+    came = ask("--commands", "30", "--blocks", "1", "--workers", "1", "--json", "--out", str(tmp_path))
+    report = msgspec.json.decode(came.stdout, type=CheckReport)
+    assert came.exit_code == (0 if report.is_passed else 1)
+    rows = {row.name: row.value for row in report.results}
+    assert rows["streams"] == 8
+    assert 8 <= rows["commands"] <= 8 * 30 + 80
+    assert {"violations", "worst_margin_share", "rest_after_silence_ms_max"} <= set(rows)
+    assert json.loads((tmp_path / "check.json").read_text())["bench"] == "safety"
+    assert (tmp_path / "margins.png").stat().st_size > 10_000
+
+
+def test_one_stream_is_shown_alone():
+    came = ask("--commands", "30", "--stream", "1", "--profile", "attended")
+    assert came.exit_code in (0, 1)
+    assert "streams 1," in came.stdout
+
+
+def test_a_check_that_finds_something_fails(monkeypatch):
+    monkeypatch.setattr("sim_twin.checking.command._many", lambda *_: broken_tally())
+    came = ask()
+    assert came.exit_code == 1
+    assert "violations 1" in came.stdout
+
+
+def broken_tally() -> Tally:
+    tally = Tally()
+    tally.add(result(5, reading(share=-0.2, broken=True)))
+    return tally
+
+
+def test_a_check_that_finds_nothing_passes(monkeypatch):
+    tally = Tally()
+    tally.add(result(5, reading()))
+    monkeypatch.setattr("sim_twin.checking.command._many", lambda *_: tally)
+    assert ask().exit_code == 0
+
+
+@pytest.mark.parametrize("rig", ["virtual_lab", "lab", "fake"])
+def test_a_rig_that_is_no_twin_is_refused_before_anything_is_connected_to(rig, monkeypatch):
+    def never(*_: object) -> None:
+        raise AssertionError("nothing may be built")
+
+    monkeypatch.setattr("robot.teleop.cli.load", never)
+    came = CliRunner().invoke(root, ["teleop", "check", "--rig", rig])
+    assert came.exit_code == 2
+    assert "nothing moves" in came.output
+    assert set(CHECKERS) == {"twin"}
+
+
+@pytest.mark.parametrize("words", [("--profile", "reckless"), ("--rig", "nowhere"), ("--stream", "-1")])
+def test_bad_usage_is_told_apart_from_a_failed_check(words):
+    assert CliRunner().invoke(root, ["teleop", "check", *words]).exit_code == 2
+
+
+@pytest.mark.slow
+def test_the_workers_of_an_interrupted_check_are_gone():
+    command = [str(Path(sys.executable).parent / "autotelic"), "teleop", "check", "--workers", "2"]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, start_new_session=True)
+    time.sleep(8.0)
+    os.killpg(process.pid, signal.SIGINT)
+    _, err = process.communicate(timeout=60)
+    assert process.returncode == 1
+    assert b"interrupted" in err
+    end = time.monotonic() + 10.0
+    while is_anyone_left(process.pid) and time.monotonic() < end:
+        time.sleep(0.1)
+    assert not is_anyone_left(process.pid)
+
+
+def is_anyone_left(group: int) -> bool:
+    try:
+        os.killpg(group, 0)
+    except ProcessLookupError:
+        return False
+    return True
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("mutation", [m for m in MUTATIONS if m.name in SOUND], ids=lambda m: m.name)
+def test_each_limit_weakened_alone_by_a_twentieth_is_told(resolved, mutation):
+    attended = msgspec.structs.replace(resolved, rig=msgspec.structs.replace(resolved.rig, profile="attended"))
+    outcome = try_mutation(attended, mutation, seed=0, n_streams=len(mutation.families))
+    assert outcome.is_held, outcome
+    assert outcome.is_caught, outcome
