@@ -100,7 +100,7 @@ def _plane(by: float) -> tuple[Plane, ...]:
 
 
 def _ball(by: float) -> tuple[KeepOut, ...]:
-    centre = (0.42, 0.1, 0.24)
+    centre = (0.42, 0.1, 0.11)
     return (KeepOut(name="ball", low_m=centre, high_m=centre, radius_m=0.08 / by),)
 
 
@@ -120,7 +120,7 @@ MUTATIONS: tuple[Mutation, ...] = (
         families=("at_the_joints", "random_joints", "gate_at_places", "fast_joints"),
     ),
     Mutation(
-        name="joint speed", told_by=("joint_speed", "command_speed"),
+        name="joint speed", told_by=("command_speed",),
         tighten=lambda p: _set_joints(p, speed_rad_s=0.4),
         weaken=lambda p: _joints(p, speed_rad_s=BY),
         families=("gate_at_places", *_FAST),

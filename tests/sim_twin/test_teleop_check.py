@@ -25,7 +25,17 @@ from sim_twin.perturb import NOMINAL, PERTURBATIONS
 from sim_twin.readings import Reading
 
 SHORT = 40
-SOUND = {"joint range", "tcp speed", "flange speed", "box", "plane", "keep-out", "tool cone", "grip speed"}
+SOUND = {
+    "joint range",
+    "joint speed",
+    "tcp speed",
+    "flange speed",
+    "box",
+    "plane",
+    "keep-out",
+    "tool cone",
+    "grip speed",
+}
 """Limits that the stack holds when they bind, and that streams reach."""
 
 
