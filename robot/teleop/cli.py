@@ -9,9 +9,9 @@ from rich.console import Console
 
 from config.loader import resolve
 from config.resolved import Resolved
-from robot.chatter import chatter_to_stderr
 from robot.errors import RobotConfigError
 from robot.rigs import load
+from robot.stdio import STDERR, redirected_stdout
 from robot.teleop.wanted import Answer, Wanted
 
 __all__ = ["CHECKERS", "app"]
@@ -83,7 +83,7 @@ def check(
     )  # fmt: skip
     checker = load(_checker(resolved))
     try:
-        with chatter_to_stderr():
+        with redirected_stdout(STDERR):
             answer: Answer = checker(resolved, wanted)
     except KeyboardInterrupt:
         typer.echo("interrupted: nothing was decided; the same seed begins again", err=True)

@@ -16,8 +16,8 @@ from sim_twin.controller.script.builtins import Sockets
 
 __all__ = ["Compiled", "Compiler", "InlineCompiler", "Mistake", "Start", "ThreadCompiler", "compile_text"]
 
-N_WAITING = 1000
-"""Texts that wait for the compiler; one more is turned away, or a flood would fill the memory."""
+N_WAITING, N_CHARS_WAITING = 1000, 4_194_304
+"""Texts that wait for the compiler, and their characters; one more is turned away, or a flood would fill the memory."""
 MakeBuiltins = Callable[[Sockets], Builtins]
 
 
@@ -62,14 +62,16 @@ class Start:
 
     Args:
         n_stops: How many stops had come when it was sent.
+        is_remote: It was sent under remote control.
 
     Attributes:
         n_stops: As given; a later stop takes it back.
+        is_remote: As given; local control takes it back.
         has_begun: Its program has begun, or never will; None while that is not known.
     """
 
-    def __init__(self, *, n_stops: int = 0) -> None:
-        self.n_stops = n_stops
+    def __init__(self, *, n_stops: int = 0, is_remote: bool = False) -> None:
+        self.n_stops, self.is_remote = n_stops, is_remote
         self.has_begun: bool | None = None
 
 
@@ -85,6 +87,11 @@ class Compiler(Protocol):
 
     def take(self) -> Done | None:
         """Return the next that is done, or None."""
+        ...
+
+    @property
+    def is_idle(self) -> bool:
+        """There is no text to compile and nothing to take."""
         ...
 
     def close(self) -> None:
@@ -122,6 +129,11 @@ class InlineCompiler:
         """Return the next, or None."""
         return self._done.popleft() if self._done else None
 
+    @property
+    def is_idle(self) -> bool:
+        """There is nothing to take."""
+        return not self._done
+
     def close(self) -> None:
         """Nothing to end."""
 
@@ -134,21 +146,32 @@ class ThreadCompiler:
         self._texts: queue.SimpleQueue[tuple[str, Start] | None] = queue.SimpleQueue()
         self._done: deque[Done] = deque()
         self._thread: threading.Thread | None = None
+        self._n_sent = self._n_compiled = 0
+        self._n_chars_sent = self._n_chars_compiled = 0
+        """Each has one thread that writes it: the first of a pair the loop's, the second the compiler's."""
 
     def submit(self, text: str, start: Start) -> None:
         """Queue a text."""
         if self._thread is None:
             self._thread = threading.Thread(target=self._work, name="compiler", daemon=True)
             self._thread.start()
-        if self._texts.qsize() >= N_WAITING:
-            turned_away = Mistake(message=f"expected at most {N_WAITING} programs to wait, one more was sent")
-            self._done.append((turned_away, start))
+        n_chars = self._n_chars_sent - self._n_chars_compiled
+        if self._texts.qsize() >= N_WAITING or n_chars + len(text) > N_CHARS_WAITING:
+            said = f"expected at most {N_WAITING} programs of {N_CHARS_WAITING} characters in all to wait, got one more"
+            self._done.append((Mistake(message=said), start))
             return
+        self._n_sent += 1
+        self._n_chars_sent += len(text)
         self._texts.put((text, start))
 
     def take(self) -> Done | None:
         """Return the next that is done, or None."""
         return self._done.popleft() if self._done else None
+
+    @property
+    def is_idle(self) -> bool:
+        """There is no text to compile and nothing to take."""
+        return self._n_sent == self._n_compiled and not self._done
 
     def close(self) -> None:
         """End the thread after what it has."""
@@ -165,3 +188,6 @@ class ThreadCompiler:
             except Exception as error:  # noqa: BLE001 - the thread's outermost frame: nobody else would hear of it
                 done = Mistake(message=f"the compiler failed: {error!r}")
             self._done.append((done, start))
+            self._n_compiled += 1
+            self._n_chars_compiled += len(text)
+            del sent, text, start, done  # or the last program would live until the next one comes

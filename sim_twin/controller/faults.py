@@ -18,6 +18,8 @@ from sim_twin.controller.wire import Wires, input_fields
 __all__ = ["FaultError", "Faults"]
 
 SLICES_PER_MS = 0.5
+LOOK_S = 0.1
+"""A slice that takes longer is broken by looks at the faults' door."""
 Answer = dict[str, object]
 Milliseconds: TypeAlias = Annotated[float, msgspec.Meta(ge=0.0, le=10_000.0)]
 Often: TypeAlias = Annotated[int, msgspec.Meta(ge=1, le=1_000_000)]
@@ -143,7 +145,7 @@ class Faults:
 
     def remote_control(self, on: bool = True) -> None:
         """Turn the pendant's switch to remote or to local control."""
-        self._robot.machine.modes.is_remote = on
+        self._robot.programs.turn_remote(on)
 
     # ---------------------------------------------------------------------------------------------- time and sensors
 
@@ -151,12 +153,23 @@ class Faults:
         """Let every so many slices take so much longer; 0 ms ends it."""
         self._late_s, self._n_late_every, self._n_ticks = ms * 1e-3, every, 0
 
-    def delay(self) -> None:
-        """Take the time of a late slice; the loop calls it after each."""
-        if self._late_s > 0.0:
-            self._n_ticks += 1
-            if self._n_ticks % self._n_late_every == 0:
-                time.sleep(self._late_s)
+    def delay(self, meanwhile: Callable[[], None]) -> None:
+        """Take the time of a late slice; the loop calls it after each.
+
+        Args:
+            meanwhile: Called now and then where it is long, so that somebody can end it.
+        """
+        if self._late_s <= 0.0:
+            return
+        self._n_ticks += 1
+        if self._n_ticks % self._n_late_every:
+            return
+        late_s = self._late_s
+        due_s = time.monotonic() + late_s
+        while self._late_s == late_s and (left_s := due_s - time.monotonic()) > 0.0:
+            time.sleep(min(left_s, LOOK_S))
+            if late_s > LOOK_S:
+                meanwhile()
 
     def bias(self, rad: Angles | None = None) -> None:
         """Let the joints be read so much off; nothing ends it."""
@@ -184,10 +197,14 @@ class Faults:
         kinematics.recalibrate(calibrated(kinematics.nominal, deltas))
         return {"rows": off.tolist()}
 
-    def jog(self, rad: Angles) -> None:
+    def jog(self, rad: Angles) -> Answer:
         """Let somebody at the pendant move the joints by as much, with a program of his own."""
+        refusal = self._robot.programs.refusal
+        if refusal is not None:
+            return {"refusal": f"jog: {refusal}"}
         q = (self._robot.machine.drive.measured.q_rad + np.array(rad)).tolist()
         self._robot.submit_script(f"def jog():\n movej({q}, a=1.0, v=0.5)\nend\n")
+        return {}
 
     def force_inputs(self, bits: Bits = 0) -> None:
         """Let these digital inputs be on, whatever the table says."""

@@ -3,6 +3,8 @@
 from collections import deque
 from collections.abc import Callable
 
+import msgspec
+
 from sim_twin.controller.script.builtins import Popup
 from sim_twin.controller.states import SafetyMode
 from sim_twin.controller.wire.primary_messages import (
@@ -18,6 +20,10 @@ from sim_twin.controller.wire.primary_messages import (
 __all__ = ["Journal"]
 
 N_LINES = 1000
+N_SHOWN = 500
+"""Characters of a text in the log or a message; some hundred are what a person sees of it on a robot."""
+N_MESSAGES = 20
+"""Texts and popups of programs in one slice; what comes after them is counted."""
 _UNKNOWN = (0, 0)
 _STOPS = frozenset(SafetyMode) - {SafetyMode.NORMAL, SafetyMode.REDUCED, SafetyMode.RECOVERY}
 _LEVELS = {SafetyMode.VIOLATION: ReportLevel.VIOLATION, SafetyMode.FAULT: ReportLevel.FAULT}
@@ -43,19 +49,29 @@ class Journal:
         self.popup: Popup | None = None
         self.safety_mode = SafetyMode.NORMAL
         self._why: tuple[int, int] | None = None
+        self._n_said = 0
 
     def note(self, text: str) -> None:
         """Write a line to the log."""
-        self.lines.append((self._stamp_us(), text))
+        self.lines.append((self._stamp_us(), text[:N_SHOWN]))
 
     def log(self, text: str) -> None:
         """Take a program's textmsg."""
-        self.note(text)
-        self.outbox.append(pack_text(text, stamp_us=self._stamp_us()))
+        if self._is_heard():
+            self._say(text)
+
+    def end_slice(self) -> None:
+        """Say how much of what programs had to say in this slice was left out, where they said too much."""
+        if self._n_said > N_MESSAGES:
+            self._say(f"{self._n_said - N_MESSAGES} messages left out")
+        self._n_said = 0
 
     def show(self, popup: Popup) -> None:
         """Open a program's popup."""
+        popup = msgspec.structs.replace(popup, title=popup.title[:N_SHOWN], text=popup.text[:N_SHOWN])
         self.popup = popup
+        if not self._is_heard():
+            return
         self.note(f"popup {popup.title}: {popup.text}")
         self.outbox.append(
             pack_popup(
@@ -75,14 +91,14 @@ class Journal:
     def key(self, title: str, text: str) -> None:
         """Say what became of a program, such as PROGRAM_XXX_STARTED and its name."""
         self.note(f"{title}: {text}")
-        self.outbox.append(pack_key(0, stamp_us=self._stamp_us(), title=title, text=text))
+        self.outbox.append(pack_key(0, stamp_us=self._stamp_us(), title=title, text=text[:N_SHOWN]))
 
     def exception(
         self, *, program: str, thread: str, line: int, column: int, message: str, as_reported: str = ""
     ) -> None:
         """Say where a program failed, and why: to the log, and as a robot reports it on the primary port."""
         self.note(f"program {program}, thread {thread}, line {line}: {message}")
-        text = as_reported or message
+        text = (as_reported or message)[:N_SHOWN]
         self.outbox.append(pack_runtime_exception(line, column, text, stamp_us=self._stamp_us()))
 
     def error(self, code: int, argument: int, text: str, *, is_violation: bool = False) -> None:
@@ -106,6 +122,14 @@ class Journal:
             self._report(*_UNKNOWN, text, _LEVELS.get(mode, ReportLevel.WARNING))
         code, argument = why or _UNKNOWN
         self.outbox.append(pack_safety_mode(code, argument, stamp_us=self._stamp_us(), safety_mode=mode))
+
+    def _is_heard(self) -> bool:
+        self._n_said += 1
+        return self._n_said <= N_MESSAGES
+
+    def _say(self, text: str) -> None:
+        self.note(text)
+        self.outbox.append(pack_text(text[:N_SHOWN], stamp_us=self._stamp_us()))
 
     def _report(self, code: int, argument: int, text: str, level: ReportLevel) -> None:
         self.outbox.append(pack_error_code(code, argument, stamp_us=self._stamp_us(), level=level, text=text))

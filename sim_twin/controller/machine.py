@@ -84,9 +84,10 @@ class Machine:
 
     def write(self, name: str, value: Value) -> None:
         """Take one input that a client writes; wire.InputSink."""
+        self.watchdogs.wrote(name)
         if self.registers.write(name, value):  # pyright: ignore[reportArgumentType] -- a register's field is a number
-            self.watchdogs.wrote(name)
-        elif not self.io.write(name, value) and name == "external_force_torque":
+            return
+        if not self.io.write(name, value) and name == "external_force_torque":
             self.external_wrench = [float(v) for v in value]  # pyright: ignore[reportGeneralTypeIssues,reportArgumentType] -- six by its type
 
     def tool_acceleration(self) -> tuple[float, float, float]:

@@ -11,7 +11,7 @@ from sim_twin.controller.motion.poses import Array
 from sim_twin.controller.outputs import elbow, elbow_velocity, joint_mode, robot_current_a
 from sim_twin.controller.program import UNNAMED, Programs
 from sim_twin.controller.script.builtins import Popup
-from sim_twin.controller.states import Event, RobotMode, RuntimeState, SafetyMode
+from sim_twin.controller.states import Event, RuntimeState, SafetyMode
 from sim_twin.controller.wire import Awaited, DashboardStatus, Outcome
 from sim_twin.controller.wire.primary_state import (
     AdditionalInfo,
@@ -119,10 +119,9 @@ class Panel:
         if modes.runtime is RuntimeState.PAUSED:
             resumed = self._happen(Event.PLAY)
             return lambda: resumed
-        is_ready = modes.robot is RobotMode.RUNNING and not modes.is_stopped_by_safety
-        if programs.loaded is None or not is_ready or modes.runtime is not RuntimeState.STOPPED:
+        if programs.loaded is None or programs.refusal is not None or modes.runtime is not RuntimeState.STOPPED:
             return lambda: Outcome.FAILED
-        start = programs.submit(programs.shelf[programs.loaded])
+        start = programs.submit(programs.shelf[programs.loaded], is_remote=modes.is_remote)
         return lambda: _STARTED[start.has_begun]
 
     def stop(self) -> Outcome:
@@ -131,8 +130,8 @@ class Panel:
         return Outcome.DONE
 
     def pause(self) -> Outcome:
-        """Pause what runs."""
-        return self._happen(Event.PAUSE)
+        """Pause what runs; what was sent before does not replace it any more."""
+        return Outcome.DONE if self._programs.pause().refusal is None else Outcome.FAILED
 
     def load(self, path: str) -> Outcome:
         """Load a program of the shelf."""

@@ -9,13 +9,20 @@ from collections import deque
 from sim_twin.controller.compiling import Compiled, Compiler, Mistake, Start
 from sim_twin.controller.machine import Machine
 from sim_twin.controller.script import Status
-from sim_twin.controller.states import Event, ProgramOrder, Reaction, RuntimeState
+from sim_twin.controller.states import Event, ProgramOrder, Reaction, RobotMode, RuntimeState
+from sim_twin.controller.wire.script_framer import N_PROGRAM_CHARS
 
 __all__ = ["UNNAMED", "Programs"]
 
 UNNAMED = "unnamed"
 SECONDARY = "SECONDARY_PROGRAM_EXCEPTION_XXX"
 """What a robot puts before the reason for which a secondary program failed."""
+STOPPED_BEFORE = "it was stopped before it began"
+_TAKES_BACK = frozenset(Event) - {
+    Event.PLAY, Event.PAUSE, Event.STOP, Event.PROGRAM_ENDED, Event.REDUCED, Event.REDUCED_ENDED,
+}  # fmt: skip
+"""After a stop, a loss of power and the way back from them nothing may begin that was sent before, or the arm would
+move by itself once somebody has released a button. What a program or its watchdog brings about is not among them."""
 N_SECONDARY = 1000
 """Secondary programs that wait; one more is turned away, or a flood would fill the memory."""
 
@@ -43,34 +50,73 @@ class Programs:
         self.last_text = ""
         self._next: tuple[Compiled, Start] | None = None
         self._secondary = deque[Compiled]()
-        self._n_stops = 0
+        self._n_stops = {True: 0, False: 0}
+        """By whether the texts that they take back are remote."""
 
     @property
     def line(self) -> int:
         """The line that the program is at; 0 where none runs."""
         return 0 if self.main is None else self.main.interpreter.line
 
-    def submit(self, text: str) -> Start:
-        """Take a program's text: a `def` replaces the one that runs, a `sec` runs beside it. Tells what comes of it."""
+    @property
+    def is_empty(self) -> bool:
+        """No program runs, waits or is being made."""
+        return self.main is None and self._next is None and not self._secondary and self._compiler.is_idle
+
+    @property
+    def refusal(self) -> str | None:
+        """Why no program could start now, whatever runs; None where one could."""
+        modes = self._machine.modes
+        if modes.robot is RobotMode.RUNNING and not modes.is_stopped_by_safety:
+            return None
+        return f"no program can start in mode {modes.robot.name}, safety mode {modes.safety.name}"
+
+    def submit(self, text: str, *, is_remote: bool = False) -> Start:
+        """Take a program's text: a `def` replaces the one that runs, a `sec` runs beside it. Tells what comes of it.
+
+        Args:
+            text: The program.
+            is_remote: It came from elsewhere, under remote control.
+        """
+        start = Start(n_stops=self._n_stops[is_remote], is_remote=is_remote)
+        if len(text) > N_PROGRAM_CHARS:
+            too_long = f"expected a program of at most {N_PROGRAM_CHARS} characters, got {len(text)}"
+            self._take(Mistake(message=too_long), start)
+            return start
         self.last_text = text
-        start = Start(n_stops=self._n_stops)
         self._compiler.submit(text, start)
         return start
+
+    def refuse(self, why: str) -> None:
+        """Say why there is no program to take."""
+        self._take(Mistake(message=why), Start())
 
     def stop(self) -> Reaction:
         """Stop what runs and let nothing start that was sent before, compiled or not. Secondary programs go on.
 
         So somebody stops the robot. A program that stops itself, starves or is replaced takes none with it.
         """
-        self._n_stops += 1
-        if self._next is not None:
-            self._turn_down(*self._next, "it was stopped before it began")
-            self._next = None
+        self._take_back()
         return self.handle(Event.STOP)
+
+    def pause(self) -> Reaction:
+        """Pause what runs, and let nothing take its place that was sent before."""
+        reaction = self.handle(Event.PAUSE)
+        if reaction.refusal is None:
+            self._take_back()
+        return reaction
+
+    def turn_remote(self, on: bool) -> None:
+        """Turn to remote or to local control, in which no program starts that was sent under remote control."""
+        self._machine.modes.is_remote = on
+        if not on:
+            self._take_back(is_local_too=False)
 
     def handle(self, event: Event, *, joint: int | None = None) -> Reaction:
         """Let an event happen: modes, arm and program."""
         reaction = self._machine.modes.handle(event, joint=joint)
+        if event in _TAKES_BACK and reaction.refusal is None:
+            self._take_back()
         self._machine.note_safety(event, joint)
         self.obey(reaction)
         return reaction
@@ -118,13 +164,15 @@ class Programs:
                 as_reported=done.as_reported,
             )
             start.has_begun = False
+        elif done.is_secondary and start.is_remote and not self._machine.modes.is_remote:
+            self._turn_down(done, start, "the robot was turned to local control")
         elif done.is_secondary and len(self._secondary) >= N_SECONDARY:
             self._turn_down(done, start, f"{N_SECONDARY} secondary programs wait for their slice")
         elif done.is_secondary:
             self._secondary.append(done)
             start.has_begun = True
-        elif start.n_stops < self._n_stops:
-            self._turn_down(done, start, "it was stopped before it began")
+        elif start.n_stops < self._n_stops[start.is_remote]:
+            self._turn_down(done, start, STOPPED_BEFORE)
         else:
             if self._next is not None:
                 self._turn_down(*self._next, "another came before it began")
@@ -146,6 +194,14 @@ class Programs:
         self.main = program
         self._machine.begin_program()
         self._machine.journal.key("PROGRAM_XXX_STARTED", program.name or UNNAMED)
+
+    def _take_back(self, *, is_local_too: bool = True) -> None:
+        """Let nothing start that was sent before, compiled or not."""
+        for is_remote in (True, False) if is_local_too else (True,):
+            self._n_stops[is_remote] += 1
+        if self._next is not None and self._next[1].n_stops < self._n_stops[self._next[1].is_remote]:
+            self._turn_down(*self._next, STOPPED_BEFORE)
+            self._next = None
 
     def _turn_down(self, program: Compiled, start: Start, why: str) -> None:
         program.close()

@@ -91,9 +91,13 @@ class VirtualRobot:
     def submit_script(self, text: str, source: ScriptSource | None = None) -> None:
         """Take one complete program; wire.ScriptSink. In local control programs are refused."""
         if self.machine.modes.is_remote or source is None:
-            self.programs.submit(text)
+            self.programs.submit(text, is_remote=source is not None)
         else:
             self.machine.journal.note("a program was sent in local control and is ignored")
+
+    def refuse_script(self, why: str, source: ScriptSource | None = None) -> None:  # noqa: ARG002 - all are told alike
+        """Say why an upload was not read to its end; wire.ScriptSink."""
+        self.programs.refuse(why)
 
     def step(self) -> None:
         """Let one slice pass; clients' inputs have been taken before."""
@@ -114,6 +118,7 @@ class VirtualRobot:
         machine.io.digital_in = self.box.sense(machine.world.table.read_inputs()) | self.forced_inputs
         machine.io.analog_in_v = self.box.measure(machine.world.table.travel)
         self.hand.tick()
+        machine.journal.end_slice()
 
     @property
     def is_idle(self) -> bool:

@@ -32,6 +32,10 @@ CONTROL_TICKS = 5
 PLAYED, MOST_MINOR = (3, 5), 99
 PRIORITY = 45
 """What a process that runs nothing else may ask of the kernel: it stands for a box of its own, before its clients."""
+SWEEP_TICKS = 30_000
+"""Rubbish is looked for this often, and only while there is no program: a search among the parts of one takes up to
+half a second, in which nothing else runs. Programs leave next to none."""
+SEARCH_NEVER = 1_000_000_000
 SWITCH_S = 0.0002
 """How long the compiler's thread may keep the interpreter from the loop."""
 
@@ -199,13 +203,19 @@ class ControllerServer:
         sys.setswitchinterval(SWITCH_S)
         gc.collect()
         gc.freeze()
+        gc.set_threshold(*gc.get_threshold()[:2], SEARCH_NEVER)
         when_ready()
         pacer = Pacer(period_ns=round(SLICE_S * 1e9))
         while not is_over() and not self.robot.panel.is_shut_down:
             self.tick()
-            self.faults.delay()
+            self.faults.delay(self._control.poll)
             pacer.wait()
             self.ticks.n_missed = pacer.n_missed
+            self._sweep()
+
+    def _sweep(self) -> None:
+        if self._n_ticks % SWEEP_TICKS == 0 and self.robot.is_idle and self.robot.programs.is_empty:
+            gc.collect()
 
     def _note(self, trace: TraceWriter) -> None:
         drive = self.robot.machine.drive

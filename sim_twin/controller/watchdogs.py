@@ -39,12 +39,17 @@ class Watchdogs:
     def set(self, name: str, frequency_hz: float, action: WatchdogAction) -> None:
         """Expect a variable to be written so often from now on.
 
+        The same watchdog once more is no other one: its time runs on, or a loop that sets it would keep it fed.
+
         Raises:
             ValueError: the frequency is not above 0.
         """
         if not frequency_hz > 0.0:
             raise ValueError(f"expected a frequency above 0 Hz, got {frequency_hz}")
-        self._watched[name] = _Watchdog(max(1, math.ceil(SLICES_PER_S / frequency_hz - 1e-9)), action)
+        n_slices = max(1, math.ceil(SLICES_PER_S / frequency_hz - 1e-9))
+        known = self._watched.get(name)
+        if known is None or (known.n_slices, known.action) != (n_slices, action):
+            self._watched[name] = _Watchdog(n_slices, action)
 
     def wrote(self, name: str) -> None:
         """Note that a client wrote a variable."""

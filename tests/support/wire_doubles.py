@@ -145,7 +145,7 @@ class Robot:
         self.numbers = {name: ZERO_BY_KIND[kind] for name, kind in output_fields(version).items()}
         self.outputs = {name: (lambda name=name: self.numbers[name]) for name in self.numbers}
         self.written = []
-        self.scripts = []
+        self.scripts, self.refused = [], []
         self.asked = []
         self.outcome = Outcome.DONE
         self.now = DashboardStatus(
@@ -167,6 +167,9 @@ class Robot:
         self.written.append((name, value))
 
     # scripts and states
+    def refuse_script(self, why, source):
+        self.refused.append((why, source.kind))
+
     def submit_script(self, text, source):
         self.scripts.append((text, source.kind, source.address))
 

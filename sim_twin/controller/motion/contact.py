@@ -1,7 +1,5 @@
 """tool_contact: whether the tool met something, and how many slices ago it did."""
 
-from collections import deque
-
 import numpy as np
 
 from sim_twin.controller.motion.poses import Array, length
@@ -23,12 +21,16 @@ class ContactWatch:
 
     def __init__(self, *, n_slices: int = 500, threshold_n: float = THRESHOLD_N) -> None:
         self._threshold_n = threshold_n
-        self._felt: deque[Array] = deque(maxlen=n_slices)
+        self._n = n_slices
+        self._felt = np.zeros((2 * n_slices, 3))
+        """A ring, written twice: the last n slices are n rows on end, whatever place the next is written to."""
+        self._next = 0
         self._speed = np.zeros(3)
 
     def push(self, force_n: Array, speed_m_s: Array) -> None:
         """Take in one slice: force of the world on the tool and the tool's speed, base axes.  (3,), (3,)"""
-        self._felt.append(np.array(force_n))
+        self._felt[self._next] = self._felt[self._next + self._n] = force_n
+        self._next = (self._next + 1) % self._n
         if length(speed_m_s) > MOVING_M_S:
             self._speed = np.array(speed_m_s)
 
@@ -42,9 +44,6 @@ class ContactWatch:
         size = length(way)
         if size == 0.0:
             return 0
-        n = 0
-        for force in reversed(self._felt):
-            if -float(force @ way) / size < self._threshold_n:
-                break
-            n += 1
-        return n
+        against = -(self._felt[self._next : self._next + self._n] @ way) / size  # (n,), the oldest first
+        free = np.flatnonzero(against < self._threshold_n)
+        return self._n - 1 - int(free[-1]) if len(free) else self._n

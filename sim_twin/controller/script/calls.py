@@ -6,7 +6,7 @@ from types import GeneratorType
 
 from sim_twin.controller.script.code import Builtin, Code, Fast, Frame, Slow, applied
 from sim_twin.controller.script.context import Context, Routine, Scope, takes_time
-from sim_twin.controller.script.costs import length_cost
+from sim_twin.controller.script.costs import WRITING, length_cost, text_cost
 from sim_twin.controller.script.errors import ScriptRuntimeError
 from sim_twin.controller.script.syntax import Call, Definition, Expression, Place, Run
 from sim_twin.controller.script.threads import Steps, Wait
@@ -183,6 +183,13 @@ def _reason(error: Exception, values: Sequence[Value]) -> str:
     return said if is_ours else f"expected other arguments, got {', '.join(map(described, values)) or 'none'}"
 
 
+def _costs_of(builtin: str, own: int) -> Callable[[Sequence[Value]], int]:
+    """Return what tells a call's cost by its arguments."""
+    if builtin in WRITING:
+        return lambda values: own + sum(length_cost(value) + text_cost(value) for value in values)
+    return lambda values: own + sum(map(length_cost, values))
+
+
 def _call_of_builtin(
     called: str,
     builtin: Builtin,
@@ -191,7 +198,7 @@ def _call_of_builtin(
     context: Context,
 ) -> Code[Value]:
     n_positional, names = len(positional), list(keywords)
-    spend, copied, cost = context.meter.spend, context.copied, context.cost(called)
+    spend, copied, cost_with = context.meter.spend, context.copied, _costs_of(called, context.cost(called))
 
     def failed(error: Exception, values: Sequence[Value]) -> ScriptRuntimeError:
         return ScriptRuntimeError(f"{called}(): {_reason(error, values)}")
@@ -203,7 +210,7 @@ def _call_of_builtin(
     function = named if names else builtin
 
     def result_of(*values: Value) -> "Value | Generator[Wait | None, None, Value]":
-        spend(cost + sum(map(length_cost, values)))
+        spend(cost_with(values))
         try:
             return function(*map(copied, values))
         except _BAD_ARGUMENTS as error:
@@ -214,7 +221,7 @@ def _call_of_builtin(
         return _slow_builtin(operands, result_of, failed)
 
     def value_of(*values: Value) -> Value:
-        spend(cost + sum(map(length_cost, values)))
+        spend(cost_with(values))
         try:
             result = function(*map(copied, values))
         except _BAD_ARGUMENTS as error:

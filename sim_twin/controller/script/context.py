@@ -75,6 +75,17 @@ class Context:
             self.to_compile.append(known)
         return known
 
+    def forget(self) -> None:
+        """Drop the code of all functions, once nothing runs any more.
+
+        Code and functions hold one another; left to the garbage collector, a program would cost it hundreds of
+        milliseconds in which nothing else runs.
+        """
+        for routine in self._routines.values():
+            routine.body = None
+            routine.defaults.clear()
+        self._routines.clear()
+
     def cost(self, name: str) -> int:
         """Return what a call of a builtin costs, beside its arguments and what it returns."""
         return self._costs.get(name, BUILTIN)

@@ -8,10 +8,21 @@ from collections.abc import Callable
 
 import msgspec
 
+from sim_twin.controller.pose import Pose
 from sim_twin.controller.script.syntax import Assign, Critical, Definition, If, Name, Statement, ThreadAction, While
 from sim_twin.controller.script.values import ScriptStruct, Value, copied_and_counted
 
-__all__ = ["BUILTIN", "CALL", "Spend", "copier", "length_cost", "round_cost", "statement_cost"]
+__all__ = [
+    "BUILTIN",
+    "CALL",
+    "WRITING",
+    "Spend",
+    "copier",
+    "length_cost",
+    "round_cost",
+    "statement_cost",
+    "text_cost",
+]
 
 Spend = Callable[[int], None]
 
@@ -25,6 +36,10 @@ _PART = 12  # a pose, a string, a list or a struct within another
 _SWITCH = 6  # where a thread waits for others, beside its turn
 _PLACE = 6  # where a part of a variable is assigned
 _NUMBERS = frozenset({bool, int, float})
+_WRITTEN, _MIXED = 3, 6  # a number as text, in a list of numbers and in any other
+_POSE = 16
+WRITING = frozenset({"popup", "socket_send_line", "socket_send_string", "str_cat", "textmsg", "to_str"})
+"""Functions that write their arguments out, whatever those are."""
 
 
 def statement_cost(node: Statement) -> int:
@@ -64,6 +79,17 @@ def length_cost(value: Value) -> int:
     if type(value) is list:
         return len(value) // _N_COPIED + sum(_PART + length_cost(part) for part in value if type(part) not in _NUMBERS)
     return sum(_PART + length_cost(part) for part in value.members.values()) if type(value) is ScriptStruct else 0
+
+
+def text_cost(value: Value) -> int:
+    """Return what it costs to write a value out, beside going through it; a number among other things takes longer."""
+    if type(value) is list:
+        others = [part for part in value if type(part) not in _NUMBERS]
+        written = (_MIXED if others else _WRITTEN) * len(value)
+        return written + sum(_PART + text_cost(part) for part in others)
+    if type(value) is ScriptStruct:
+        return sum(_MIXED + _PART + text_cost(part) for part in value.members.values())
+    return _POSE if isinstance(value, Pose) else 0
 
 
 def _n_nodes(node: object) -> int:

@@ -65,7 +65,7 @@ class Interpreter:
         may_take_time = not program.is_secondary
         self._scheduler = Scheduler(self._meter, slice_budget=slice_budget, may_take_time=may_take_time)
         check_names(program, builtins=builtins, variables=variables or ())
-        context = Context(
+        self._context = context = Context(
             program,
             builtins=builtins,
             scheduler=self._scheduler,
@@ -122,6 +122,7 @@ class Interpreter:
         except Exception as error:  # noqa: BLE001 - as in step
             if self.error is None:
                 self._fail(f"the controller failed to end this: {error!r}")
+        self._context.forget()
 
 
 def _work(body: Code[Signal | None]) -> Steps[object]:

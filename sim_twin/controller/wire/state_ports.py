@@ -9,13 +9,17 @@ from sim_twin.controller.wire.primary import pack_state
 from sim_twin.controller.wire.primary_messages import pack_version
 from sim_twin.controller.wire.primary_state import PrimaryState
 from sim_twin.controller.wire.realtime import RealtimeState, pack_realtime, realtime_size
-from sim_twin.controller.wire.script_framer import ScriptFramer
+from sim_twin.controller.wire.script_framer import N_LINE_BYTES, N_PROGRAM_CHARS, N_PROGRAM_LINES, ScriptFramer
 from sim_twin.controller.wire.version import ControllerVersion
 
 __all__ = ["SCRIPT_BUDGET", "PortKind", "ScriptSink", "ScriptSource", "StatePort", "StatePorts", "StateSource"]
 
 # A script of ur_rtde has 42 kB; it arrives within eleven polls.
 SCRIPT_BUDGET = Budget(bytes_a_poll=4096)
+_TOO_LONG = (
+    f"expected a program of at most {N_PROGRAM_CHARS} characters and {N_PROGRAM_LINES} lines, "
+    f"each of at most {N_LINE_BYTES} bytes"
+)
 _SLOW_STEPS = 50
 _OLD_STEPS = 4
 
@@ -46,6 +50,10 @@ class ScriptSink(Protocol):
 
     def submit_script(self, text: str, source: ScriptSource) -> None:
         """Take one complete program; it is compiled and started elsewhere, not within this call."""
+        ...
+
+    def refuse_script(self, why: str, source: ScriptSource) -> None:
+        """Say why an upload is not read to its end; its connection is closed."""
         ...
 
 
@@ -90,6 +98,7 @@ class StatePort:
         for text in framer.feed(chunk):
             self._scripts.submit_script(text, ScriptSource(self.kind, peer))
         if framer.is_overlong:
+            self._scripts.refuse_script(_TOO_LONG, ScriptSource(self.kind, peer))
             peer.close()
 
     def closed(self, peer: Peer) -> None:
@@ -104,11 +113,6 @@ class StatePort:
     def takers(self, n_bytes: int) -> list[Peer]:
         """Return the clients that keep up with packages of this size."""
         return [peer for peer in self._framers if peer.has_room(n_bytes)]
-
-    def tell(self, message: bytes) -> None:
-        """Send a message to every client, and drop those that do not read."""
-        for peer in tuple(self._framers):
-            peer.reply(message)
 
 
 class StatePorts:
@@ -177,6 +181,6 @@ class StatePorts:
                 port.stream(package)
 
     def tell(self, message: bytes) -> None:
-        """Send a robot message to the clients of the primary ports, who alone receive them."""
-        self.primary.tell(message)
-        self.primary_read_only.tell(message)
+        """Send a robot message to those clients of the primary ports, who alone receive them, that keep up."""
+        self.primary.stream(message)
+        self.primary_read_only.stream(message)

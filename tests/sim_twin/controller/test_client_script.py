@@ -61,6 +61,27 @@ def shifted(text, to):
     return moved
 
 
+def permuted(text, seed):
+    """Shuffle the script's functions and threads before what else is in it; an inner one stays in its own."""
+    first, *lines = text.split("\n")
+    blocks, others, depth = [], [], 0
+    for line in lines:
+        code = line.split("#")[0].strip()
+        if depth == 0 and re.match(r"(def|thread)\b", code):
+            blocks.append([line])
+            depth = 1
+        elif depth > 0:
+            blocks[-1].append(line)
+            depth += bool(re.match(r"(def|thread|while|if)\b", code)) - bool(re.match(r"end\b", code))
+        else:
+            others.append(line)
+    assert depth == 0
+    order = np.random.default_rng(seed).permutation(len(blocks))
+    assert (order != np.arange(len(blocks))).any()
+    shuffled = [line for i in order for line in blocks[i]]
+    return "\n".join([first, *shuffled, *others]), len(blocks)
+
+
 def traced(text, first):
     client = RegisterClient(make_robot(), first)
     client.start(text)
@@ -78,11 +99,24 @@ def traced(text, first):
     return client
 
 
-def test_names_and_registers_do_not_matter(uploaded):
+@pytest.fixture(scope="module")
+def plain(uploaded):
+    return traced(uploaded, 0)
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_the_order_of_functions_does_not_matter(uploaded, plain, seed):
+    other, n_functions = permuted(uploaded, seed)
+    assert n_functions > 20
+    assert sorted(other.split("\n")) == sorted(uploaded.split("\n"))
+    assert (plain.joints() == traced(other, 0).joints()).all()
+
+
+def test_names_order_and_registers_do_not_matter(uploaded, plain):
     known = set(program_builtins(make_robot().machine, Sockets(slice_s=0.002)))
-    other, own = renamed(uploaded, known)
+    other, own = renamed(permuted(uploaded, 2)[0], known)
     assert len(own) > 80
-    plain, changed = traced(uploaded, 0), traced(shifted(other, 24), 24)
+    changed = traced(shifted(other, 24), 24)
     assert len(plain.trace) > 500
     assert (plain.joints() == changed.joints()).all()
     assert changed.robot.machine.registers.outputs.ints[0] == 0, "the lower registers are not touched"

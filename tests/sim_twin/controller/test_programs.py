@@ -1,14 +1,17 @@
 """Programs of the virtual robot: what starts, pauses, stops and replaces them. Without ports, the same every time."""
 
+import gc
 import math
 from threading import Event as Gate
 
 import pytest
 
 from sim_twin.controller.compiling import InlineCompiler, ThreadCompiler
+from sim_twin.controller.faults import Faults
 from sim_twin.controller.program import N_SECONDARY
-from sim_twin.controller.states import Event, RuntimeState, SafetyMode
+from sim_twin.controller.states import Event, PowerTimes, RuntimeState, SafetyMode
 from sim_twin.controller.wire import Outcome
+from sim_twin.controller.wire.script_framer import N_PROGRAM_CHARS
 from tests.support.virtual_robot import FOREVER, ended, lines, make_robot, run, started, state_of
 
 SEC = "sec side():\n set_digital_out(3, True)\nend\n"
@@ -202,6 +205,133 @@ def test_a_stop_drops_what_waits_for_the_arm_to_come_to_rest():
     robot.panel.stop()
     run(robot, 500)
     assert (state_of(robot), start.has_begun, robot.programs.main) == (STOPPED, False, None)
+
+
+BACK = {
+    Event.ROBOT_ESTOP: (Event.ROBOT_ESTOP_RELEASED, Event.BRAKE_RELEASE),
+    Event.SYSTEM_ESTOP: (Event.SYSTEM_ESTOP_RELEASED, Event.BRAKE_RELEASE),
+    Event.SAFEGUARD_OPENED: (Event.SAFEGUARD_CLOSED,),
+    Event.PROTECTIVE_STOP: (Event.UNLOCK_PROTECTIVE_STOP,),
+    Event.VIOLATION: (Event.RESTART_SAFETY, Event.BRAKE_RELEASE),
+    Event.FAULT: (Event.RESTART_SAFETY, Event.BRAKE_RELEASE),
+    Event.POWER_OFF: (Event.BRAKE_RELEASE,),
+    Event.RESTART_SAFETY: (Event.BRAKE_RELEASE,),
+}
+"""What stops a robot, and what a person does until a program could start again."""
+
+
+def stop_and_come_back(robot, event):
+    robot.machine.modes.times = PowerTimes(n_power_on=5, n_brake_release=5, n_before_unlock=5)
+    for each in (event, *BACK[event]):
+        assert robot.programs.handle(each).refusal is None
+        run(robot, 20)
+    assert robot.programs.refusal is None
+
+
+@pytest.mark.parametrize("event", BACK)
+def test_what_still_compiles_when_the_robot_is_stopped_does_not_start_afterwards(slow, event):
+    robot, gate = slow
+    start = robot.programs.submit(FOREVER, is_remote=True)
+    stop_and_come_back(robot, event)
+    gate.set()
+    run(robot, 5000, lambda: start.has_begun is not None)
+    run(robot, 20)
+    assert (start.has_begun, state_of(robot), robot.programs.main) == (False, STOPPED, None)
+    start = robot.programs.submit(FOREVER, is_remote=True)
+    run(robot, 5000, lambda: start.has_begun is not None)
+    assert start.has_begun, "the next is not dropped too"
+
+
+@pytest.mark.parametrize("event", [event for event in BACK if event is not Event.SAFEGUARD_OPENED])
+def test_what_was_sent_during_a_stop_does_not_start_after_it(slow, event):
+    robot, gate = slow
+    robot.programs.handle(event)
+    start = robot.programs.submit(FOREVER, is_remote=True)
+    stop_and_come_back(robot, event)
+    gate.set()
+    run(robot, 5000, lambda: start.has_begun is not None)
+    assert (start.has_begun, robot.programs.main) == (False, None)
+
+
+@pytest.mark.parametrize("event", BACK)
+def test_a_stop_by_safety_drops_what_waits_for_the_arm_to_come_to_rest(event):
+    robot = started("def f():\n speedj([0.5, 0, 0, 0, 0, 0], 2, 20)\nend\n")
+    run(robot, 300)
+    start = robot.programs.submit(FOREVER)
+    run(robot, 2)
+    assert (state_of(robot), start.has_begun) == (RuntimeState.STOPPING, None)
+    robot.programs.handle(event)
+    assert start.has_begun is False
+    run(robot, 500)
+    assert robot.programs.main is None
+
+
+def test_nothing_that_was_sent_under_remote_control_starts_in_local_control(slow):
+    robot, gate = slow
+    faults = Faults(robot, None, None)
+    sent = [robot.programs.submit(text, is_remote=True) for text in (SEC, FOREVER)]
+    local = robot.programs.submit(FOREVER.replace("waits", "pendant"))
+    faults.apply("remote", on=False)
+    gate.set()
+    run(robot, 5000, lambda: local.has_begun is not None)
+    run(robot, 5)
+    assert [start.has_begun for start in (*sent, local)] == [False, False, True]
+    assert robot.programs.main.name == "pendant"
+    assert robot.machine.io.digital_out == 0
+    faults.apply("remote", on=True)
+    run(robot, 20)
+    assert robot.programs.main.name == "pendant"
+
+
+def test_what_was_sent_before_a_turn_to_local_control_and_back_does_not_start(slow):
+    robot, gate = slow
+    start = robot.programs.submit(FOREVER, is_remote=True)
+    for on in (False, True):
+        Faults(robot, None, None).apply("remote", on=on)
+    gate.set()
+    run(robot, 5000, lambda: start.has_begun is not None)
+    assert start.has_begun is False
+
+
+def test_a_person_s_pause_keeps_its_program_from_being_replaced_by_what_was_sent_before(slow):
+    robot, gate = slow
+    gate.set()
+    robot.submit_script(FOREVER)
+    run(robot, 5000, lambda: state_of(robot) is PLAYING)
+    gate.clear()
+    start = robot.programs.submit(FOREVER.replace("waits", "other"))
+    assert robot.panel.pause() is Outcome.DONE
+    gate.set()
+    run(robot, 5000, lambda: start.has_begun is not None)
+    run(robot, 20)
+    assert (start.has_begun, state_of(robot), robot.programs.main.name) == (False, PAUSED, "waits")
+
+
+@pytest.mark.parametrize("compiler", [InlineCompiler, ThreadCompiler])
+def test_the_longest_program_is_taken_and_a_longer_one_refused_with_its_length(compiler):
+    robot = make_robot(compiler=compiler)
+    end = "\n while True:\n  sync()\n end\nend\n"
+    longest = "def f():\n#" + "x" * (N_PROGRAM_CHARS - 10 - len(end)) + end
+    assert len(longest) == N_PROGRAM_CHARS
+    starts = [robot.programs.submit(longest), robot.programs.submit(longest + "\n")]
+    run(robot, 5000, lambda: starts[0].has_begun is not None)
+    assert [start.has_begun for start in starts] == [True, False]
+    assert any(f"at most {N_PROGRAM_CHARS} characters, got {N_PROGRAM_CHARS + 1}" in line for line in lines(robot))
+    robot.close()
+
+
+def test_a_program_that_has_ended_leaves_nothing_to_the_garbage_collector():
+    functions = "".join(f" def g{i}(a):\n  x = [1, 2, a]\n  g{i}(a)\n end\n" for i in range(100))
+    text = f"def f():\n{functions} thread t():\n  sync()\n end\n run t()\n sync()\nend\n"
+    robot = make_robot()
+    gc.collect()
+    gc.disable()
+    try:
+        robot.submit_script(text)
+        ended(robot)
+        assert gc.collect() < 200
+    finally:
+        gc.enable()
 
 
 def test_a_program_that_ends_or_stops_itself_takes_nothing_along_that_was_sent_meanwhile(slow):

@@ -1,7 +1,10 @@
 """The virtual controller's process: its pace, its addresses, the version that it announces."""
 
+import sys
+
 import pytest
 
+from sim_twin.controller import server as module
 from sim_twin.controller.pacing import Pacer
 from sim_twin.controller.server import ControllerServer, Setup, parse_version
 from sim_twin.controller.states import SafetyMode
@@ -54,6 +57,46 @@ def test_a_plane_of_the_set_up_stops_the_tool_that_is_driven_through_it():
         "C152A0: target position is beyond a safety plane"
     ]
     server.close()
+
+
+class FakeGc:
+    def __init__(self):
+        self.threshold, self.n_full = (700, 10, 10), 0
+
+    def collect(self):
+        self.n_full += 1
+
+    def freeze(self):
+        assert self.n_full == 1
+
+    def get_threshold(self):
+        return self.threshold
+
+    def set_threshold(self, *threshold):
+        self.threshold = threshold
+
+
+def test_rubbish_is_looked_for_only_while_there_is_no_program(monkeypatch):
+    fake, switch_s, left = FakeGc(), sys.getswitchinterval(), [12]
+    monkeypatch.setattr(module, "gc", fake)
+    monkeypatch.setattr(module, "SWEEP_TICKS", 1)
+    server = ControllerServer(Setup())
+
+    def is_over():
+        left[0] -= 1
+        if left[0] == 6:
+            assert fake.n_full > 3
+            server.robot.submit_script("def f():\n while True:\n  sync()\n end\nend\n")
+            fake.n_full = 0
+        return left[0] <= 0
+
+    try:
+        server.run(when_ready=lambda: None, is_over=is_over)
+    finally:
+        sys.setswitchinterval(switch_s)
+        server.close()
+    assert fake.n_full == 0, "neither while it compiles nor while it runs"
+    assert fake.threshold[2] > 1e6, "nor by Python itself"
 
 
 @pytest.mark.parametrize("plane", [(0.0, 0.0, 0.0, 0.1), (0.0, float("nan"), 1.0, 0.1), (0.0, 0.0, 1.0, float("inf"))])

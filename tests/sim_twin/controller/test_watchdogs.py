@@ -2,8 +2,11 @@
 
 import pytest
 
+from sim_twin.controller.machine import Machine
+from sim_twin.controller.robot import make_world
 from sim_twin.controller.states import RuntimeState
 from sim_twin.controller.watchdogs import WatchdogAction, Watchdogs
+from sim_twin.controller.wire import ControllerVersion, input_fields
 from tests.support.virtual_robot import lines, run, started, state_of
 
 PAUSE, STOP, IGNORE = WatchdogAction.PAUSE, WatchdogAction.STOP, WatchdogAction.IGNORE
@@ -23,6 +26,52 @@ def test_a_watchdog_bites_in_the_slice_after_its_time_and_no_earlier(hz, n, acti
     dogs.set("a", hz, action)
     assert [dogs.tick() for _ in range(n)] == [None] * n
     assert dogs.tick() == ("a", action)
+
+
+def test_a_watchdog_that_is_set_again_in_every_slice_starves_all_the_same():
+    dogs = Watchdogs()
+    seen = []
+    for _ in range(12):
+        dogs.set("a", 50, STOP)
+        seen.append(dogs.tick())
+    assert seen == [*[None] * 10, ("a", STOP), None]
+
+
+@pytest.mark.parametrize(("hz", "action"), [(100, STOP), (50, PAUSE)])
+def test_another_rate_or_action_begins_the_time_anew(hz, action):
+    dogs = Watchdogs()
+    dogs.set("a", 50, STOP)
+    assert [dogs.tick() for _ in range(10)] == [None] * 10
+    dogs.set("a", hz, action)
+    assert dogs.tick() is None
+
+
+VERSION = ControllerVersion(minor=26)
+
+
+@pytest.fixture(scope="module")
+def machine():
+    return Machine(make_world(), version=VERSION)
+
+
+@pytest.mark.parametrize("name", sorted(input_fields(VERSION)))
+def test_every_input_feeds_its_watchdog(machine, name):
+    machine.watchdogs.clear()
+    machine.watchdogs.set(name, 50, STOP)
+    n_items = input_fields(VERSION)[name].n_items
+    for _ in range(30):
+        machine.write(name, 0 if n_items == 1 else (0,) * n_items)
+        assert machine.watchdogs.tick() is None
+    assert [machine.watchdogs.tick() for _ in range(10)][-1] == (name, STOP)
+
+
+def test_a_secondary_program_cannot_touch_the_watchdogs_of_the_one_that_moves():
+    robot = watching((0, 10, "stop"))
+    run(robot, 10)
+    robot.submit_script('sec side():\n rtde_set_watchdog("input_int_register_0", 10, "ignore")\nend\n')
+    run(robot, 60)
+    assert any("rtde_set_watchdog(): a secondary program has no watchdogs" in line for line in lines(robot))
+    assert robot.programs.main is None
 
 
 @pytest.mark.parametrize("order", [1, -1])

@@ -31,6 +31,7 @@ _OPEN_TIMEOUT_S = 2.0
 _N_NUMBERS_MAX = 30  # in one read
 _N_TEXT_MAX = 1023  # bytes of a string without an ending
 _PARENTHESES = re.compile(rb"\([^()]*\)")
+_WHOLE = re.compile(r"-?[0-9]{1,10}")
 
 
 class Sockets:
@@ -170,11 +171,17 @@ class Sockets:
         self._send(f"GET {text(name)}\n".encode("latin-1"), socket_name)
         answer = yield from self._read_line(socket_name)
         words = text_of(answer).split()
-        return int(words[1]) if len(words) == 2 and words[0] == name and words[1].lstrip("-").isdigit() else 0
+        return _whole(words[1]) if len(words) == 2 and words[0] == name else 0
 
 
 def _bytes_of(value: Value) -> bytes:
     return text_of(value).encode("latin-1", errors="replace")
+
+
+def _whole(word: str) -> int:
+    """Return an integer of 32 bits; 0 where the word is none: no script can hold a longer one."""
+    found = int(word) if _WHOLE.fullmatch(word) else 0
+    return found if found == int32(found) else 0
 
 
 def _count(value: Value) -> int:

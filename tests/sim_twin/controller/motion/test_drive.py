@@ -150,6 +150,28 @@ def test_contact_is_found_and_dated():
     assert seen[-6] < 12.0 <= seen[-5]
 
 
+def test_the_watch_counts_back_to_the_last_slice_without_contact_whatever_came_before():
+    rng = np.random.default_rng(5)
+    watch, felt, way = ContactWatch(n_slices=50), [], np.array([0.3, -0.2, -2.0])
+    assert watch.slices_since_contact(way) == 0
+    lasts = np.repeat(rng.random(60) < 0.5, rng.integers(1, 80, 60))
+    for is_met in lasts:
+        against = rng.uniform(12.01, 40.0) if is_met else rng.uniform(-40.0, 11.99)
+        felt.append(is_met)
+        watch.push(-against * way / np.linalg.norm(way) + np.array([0.0, 5.0, -0.5]), way)
+        free = [k for k, was_met in enumerate(reversed(felt[-50:])) if not was_met]
+        expected = free[0] if free else min(len(felt), 50)
+        assert watch.slices_since_contact(way) == watch.slices_since_contact(0.1 * way) == expected
+        assert watch.slices_since_contact() == expected, "its last motion went the same way"
+
+
+@pytest.mark.parametrize(("against_n", "n"), [(np.nextafter(12.0, 0.0), 0), (12.0, 1), (np.nextafter(12.0, 13.0), 1)])
+def test_contact_begins_at_its_threshold(against_n, n):
+    watch = ContactWatch()
+    watch.push(np.array([0.0, 0.0, against_n]), np.zeros(3))
+    assert watch.slices_since_contact(np.array([0.0, 0.0, -1.0])) == n
+
+
 def test_pressing_too_hard_is_a_stop():
     drive = make_drive()
     over_the_table(drive, 0.03)

@@ -62,6 +62,12 @@ def test_what_is_sent_arrives_as_it_should():
         ('socket_read_string(prefix=">", suffix="<")', b"xx>in<yy", "in"),
         ('socket_read_string(prefix=">", suffix="\\n", interpret_escape=True)', b">in\n", "in"),
         ('socket_get_var("speed")', b"speed 42\n", 42),
+        *[('socket_get_var("v")', f"v {n}\n".encode(), n) for n in (2**31 - 1, -(2**31), -7)],
+        *[('socket_get_var("v")', f"v {n}\n".encode(), 0) for n in (2**31, -(2**31) - 1, 99999999999, "9" * 1000)],
+        *[
+            ('socket_get_var("v")', f"v {word}\n".encode("latin-1"), 0)
+            for word in ("--5", "5-", "-", "+5", "1.5", "\xb2")
+        ],
     ],
 )
 def test_what_arrives_is_read_as_it_should(read, sent, expected):

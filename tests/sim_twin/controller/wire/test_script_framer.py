@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sim_twin.controller.wire.script_framer import ScriptFramer
+from sim_twin.controller.wire.script_framer import N_PROGRAM_CHARS, N_PROGRAM_LINES, ScriptFramer
 
 PROGRAM = "def rtde_control():\n  # a comment\n  if True:\n    sync()\n  end\n\n  endless = 1\nend\n"
 SECONDARY = "sec lamp():\n\tset_digital_out(0, True)\nend\n"
@@ -69,6 +69,31 @@ def test_a_program_without_end_is_given_up():
     for _ in range(1000):
         framer.feed(b" sync() # and on and on\n" * 200)
     assert framer.is_overlong
+
+
+@pytest.mark.parametrize("opening", ["def f():\n", "def f(" + "a" * 60_000 + "):\n"])
+def test_a_program_may_have_so_many_characters_newlines_included_and_no_more(opening):
+    line = b"#" + b"x" * 98 + b"\n"
+    n, rest = divmod(N_PROGRAM_CHARS - len(opening) - len("end\n"), len(line))
+    for more, is_too_long in ((0, False), (1, True)):
+        framer = ScriptFramer()
+        last = b" " * (rest - 1 + more) + b"\n" if rest or more else b""
+        found = framer.feed(opening.encode()) + framer.feed(line * n) + framer.feed(last + b"end\n")
+        assert framer.is_overlong is is_too_long
+        assert [len(text) for text in found] == ([] if is_too_long else [N_PROGRAM_CHARS])
+
+
+def test_blank_lines_fill_no_memory():
+    for more, is_too_long in ((0, False), (1, True)):
+        framer = ScriptFramer()
+        found = framer.feed(b"def f():\n" + b"\n" * (N_PROGRAM_LINES - 2 + more) + b"end\n")
+        assert (framer.is_overlong, len(found)) == (is_too_long, 1 - more)
+    framer = ScriptFramer()
+    framer.feed(b"def f():\n")
+    for _ in range(1000):
+        framer.feed(b"\n" * 4096)
+    assert framer.is_overlong
+    assert not framer.is_inside, "what was read is dropped"
 
 
 def test_a_program_s_length_counts_for_itself_alone():

@@ -7,6 +7,7 @@ import pytest
 
 from sim_twin.controller.wire import ControllerVersion, PortKind
 from sim_twin.controller.wire.primary_messages import pack_text
+from sim_twin.controller.wire.script_framer import N_PROGRAM_CHARS
 
 pytestmark = pytest.mark.realtime
 
@@ -107,6 +108,34 @@ def test_messages_reach_the_primary_clients_only(bench):
     bench.wires.states.tell(pack_text("hello", stamp_us=5))
     assert primary.package() == read_only.package() == (20, struct.pack(">QbB", 5, -3, 0) + b"hello")
     assert secondary.silent()
+
+
+def test_a_flood_of_messages_cuts_nobody_off_and_is_left_out_where_it_is_not_read(bench):
+    slow, other = bench.client(30001, n_receive_bytes=4096), settle(bench, 30001)
+    message, n_bytes = pack_text("x" * 500, stamp_us=5), 0
+    for _ in range(20_000):
+        bench.wires.states.tell(message)
+        other.read()
+        n_bytes += len(other.stock)
+        other.stock = b""
+    other.silent(100)
+    assert n_bytes + len(other.stock) == 20_000 * len(message)
+    peers = bench.port(30001).peers
+    assert len(peers) == 2
+    assert max(peer.n_unsent for peer in peers) <= 16_384
+    slow.send(PROGRAM.encode())
+    slow.until(lambda: bench.robot.scripts)
+
+
+def test_a_program_that_is_too_long_is_told_and_its_client_cut_off(bench):
+    client = settle(bench, 30002)
+    client.send(b"def f():\n" + b" sync() # and on\n" * 16_500)
+    client.until(lambda: bench.robot.refused)
+    ((why, kind),) = bench.robot.refused
+    assert f"at most {N_PROGRAM_CHARS} characters" in why
+    assert kind is PortKind.SECONDARY
+    assert bench.robot.scripts == []
+    assert not bench.port(30002).peers
 
 
 def test_a_realtime_client_that_never_reads_disturbs_nobody(bench):
