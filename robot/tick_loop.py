@@ -22,6 +22,8 @@ from robot.safety import Braking, Clearance, Gate, GateLimits, Hard, Reason, Sto
 __all__ = ["Stride", "TickLoop", "guarded"]
 
 WHOLE_TICKS = 1e-6
+AHEAD_M = 0.004
+"""How much farther from bodies than the gate refuses joints begin to brake; their targets rest at twice that."""
 
 
 class Stride(msgspec.Struct, frozen=True, kw_only=True):
@@ -56,13 +58,20 @@ def guarded(
     The arm's file is already no wider than the profile.
     """
     table_m, tick_s, braking = scenario.table.height_m, rig.tick_s, Braking()
-    kept = profile.clearances
-    hard = Hard(own_m=kept.self_m, table_m=kept.scene_m, thing_m=kept.scene_m)
+    clear = profile.clearances
+    hard = Hard(own_m=clear.self_m, table_m=clear.scene_m, thing_m=clear.scene_m)
     envelope = Envelope.of(profile, config, tick_s=tick_s)
     limits = GateLimits.of(config, arm.spec, table_m=table_m, tick_s=tick_s)
     approach = Approach(config, Clearance(config, scenario, hard=hard), braking=braking)
-    stops = StopCheck(config, Clearance(config, scenario, hard=hard), limits=limits, tick_s=tick_s, braking=braking)
-    mover = Mover(config, envelope=envelope, table_m=table_m, tick_s=tick_s, approach=approach)
+    farther = Hard(own_m=hard.own_m + AHEAD_M, table_m=hard.table_m + AHEAD_M, thing_m=hard.thing_m + AHEAD_M)
+    onset_s = max(joint.acceleration_rad_s2 / joint.jerk_rad_s3 for joint in config.joints)
+    stops, soon = (
+        StopCheck(
+            config, Clearance(config, scenario, hard=kept), limits=limits, tick_s=tick_s, braking=braking, lead_s=lead_s
+        )
+        for kept, lead_s in ((hard, 0.0), (farther, tick_s + onset_s))
+    )
+    mover = Mover(config, envelope=envelope, table_m=table_m, tick_s=tick_s, approach=approach, stops=soon)
     gate = Gate(
         arm=arm, limits=limits, envelope=envelope, chain=ToolChain(config), when_latched=when_latched, stops=stops
     )

@@ -21,6 +21,7 @@ from robot.motion.target import (
     is_free,
 )
 from robot.motion.trail import Trail
+from robot.safety import StopCheck
 
 __all__ = ["Mover"]
 
@@ -40,7 +41,14 @@ class Mover:
     """Carries the target from intent to intent. `seed` forgets everything before."""
 
     def __init__(
-        self, arm: ArmConfig, *, envelope: Envelope, table_m: float, tick_s: float, approach: Approach | None = None
+        self,
+        arm: ArmConfig,
+        *,
+        envelope: Envelope,
+        table_m: float,
+        tick_s: float,
+        approach: Approach | None = None,
+        stops: StopCheck | None = None,
     ) -> None:
         """Put the parts together.
 
@@ -50,8 +58,9 @@ class Mover:
             table_m: height of the table's top, base frame.
             tick_s: how long a tick is.
             approach: what keeps targets clear of bodies and singular postures; None where there are none.
+            stops: what looks at the stop after every step of the joints, farther from bodies than the gate's.
         """
-        self._approach = approach
+        self._approach, self._stops = approach, stops
         self._limits = TargetLimits.of(arm, table_m)
         self._follower = Follower(arm, envelope=envelope, tick_s=tick_s)
         self._envelope = envelope
@@ -87,6 +96,8 @@ class Mover:
         self._trail.seed(state.q_rad)
         self._contact.reset()
         self._amounts = {}
+        if self._stops is not None:
+            self._stops.seed()
 
     def begin_step(self, intent: Intent, state: ArmState, *, duration_s: float) -> None:
         """Move the target as an intent asks for one time step. The gate has admitted the intent."""
@@ -133,13 +144,26 @@ class Mover:
             if moved is not None:
                 self._note("contact")
                 return self._give_way(moved, state)
+        before = follower.q_rad
         q = follower.step()
+        if not follower.is_upright and q != before:
+            self._brake_in_time(q, before, state)
         self._trail.add(q)
         if follower.trouble is not None:
             self._note(follower.trouble)
         if follower.held is not None:
             self._note(*follower.held)
         return q
+
+    def _brake_in_time(self, q: Vec6, before: Vec6, state: ArmState) -> None:
+        """Brake joints whose stop would come too near to a body: on the way to a new target they may leave the old way.
+
+        An upright tool keeps to straight ways, which its targets were cleared for.
+        """
+        refusal = None if self._stops is None else self._stops.check(q, before, state)
+        if refusal is not None:
+            self._note("stop_ahead", refusal.amount)
+            self._follower.brake()
 
     def _note(self, name: str, amount: float = 0.0) -> None:
         """Write down what changed the step, and by how much at most."""

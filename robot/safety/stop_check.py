@@ -29,14 +29,32 @@ class StopCheck:
     """
 
     def __init__(
-        self, arm: ArmConfig, clearance: Clearance, *, limits: GateLimits, tick_s: float, braking: Braking
+        self,
+        arm: ArmConfig,
+        clearance: Clearance,
+        *,
+        limits: GateLimits,
+        tick_s: float,
+        braking: Braking,
+        lead_s: float = 0.0,
     ) -> None:
+        """Put the parts together.
+
+        Args:
+            arm: the arm's file.
+            clearance: distances, with what each pair keeps.
+            limits: where a stop may end.
+            tick_s: how long each command holds.
+            braking: how hard a stop brakes.
+            lead_s: how long the arm goes on before it brakes.
+        """
         self._clearance, self._limits, self._tick_s = clearance, limits, tick_s
         self._chain = ToolChain(arm)
         self._sweep = Sweep(arm)
         # A stop turns a joint on by its step times the fastest joint's step times this.
         self._stretch = 1.0 / (2.0 * tick_s * tick_s * braking.deceleration_rad_s2)
         self._weaker = 1.0 / braking.least_share
+        self._lead = lead_s / tick_s
         self.seed()
 
     def seed(self) -> None:
@@ -69,7 +87,7 @@ class StopCheck:
     def _check_step(self, q_rad: Vec6, before_rad: Vec6, step: list[float]) -> Refusal | None:
         fastest = max(max(step), -min(step))
         moved_m = self._sweep.bound_m(step)
-        share = fastest * self._stretch
+        share = fastest * self._stretch + self._lead
         self._room_m -= moved_m
         self._fence_m -= moved_m
         self._range_rad -= fastest
@@ -77,7 +95,7 @@ class StopCheck:
             refusal = self._check_limits(q_rad, _along(q_rad, step, share))
             if refusal is not None:
                 return refusal
-        share *= self._weaker
+        share = fastest * self._stretch * self._weaker + self._lead
         ahead_m = moved_m * share
         if self._room_m > ahead_m:
             return None
