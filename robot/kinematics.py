@@ -57,6 +57,9 @@ class ToolChain:
         self._is_axial = x == y == 0.0 < z
         self._elbow = elbow_point(arm)
         self._finger_m = arm.tool.stroke_m / 2 + arm.tool.pad_size_m[0]
+        self._is_plain = self._is_axial and DownwardArm.fits(arm)
+        j = arm.joints
+        self._plain = (j[0].d_m, j[1].a_m, j[2].a_m, j[3].d_m, j[4].d_m, j[5].d_m, z)
 
     def tcp(self, q_rad: Vec6) -> Vec3:
         """Return the tool centre point for joint angles, base frame, metres."""
@@ -85,14 +88,16 @@ class ToolChain:
 
     def tcp_and_lowest(self, q_rad: Vec6) -> tuple[Vec3, float]:
         """Return the tool centre point and the height of the lowest fingertip of an open hand, base frame, metres."""
-        tcp, tip = self.tcp_and_tip(q_rad)
-        return tcp, self.lowest_m(tcp, (tcp[2] - tip[2]) / self._tip_m)
+        (tcp, _, _), down = self.points(q_rad)
+        return tcp, self.lowest_m(tcp, down)
 
     def points(self, q_rad: Vec6) -> tuple[tuple[Vec3, Vec3, Vec3], float]:
         """Return tool centre point, flange and elbow, base frame, metres, and how far the tool points down, -1 to 1.
 
         The last is the cosine of the angle between the approach axis and straight down.
         """
+        if self._is_plain:
+            return self._plain_points(q_rad)
         x, y, z = self._tcp
         fx = fy = fz = ex = ey = ez = 0.0
         i = N_JOINTS
@@ -110,6 +115,28 @@ class ToolChain:
                 ex, ey, ez = c * u - s * v, s * u + c * v, sa * ey + ca * ez + d
         down = (fz - z) / self._tcp[2] if self._is_axial else (z - self.tcp_and_tip(q_rad)[1][2]) / self._tip_m
         return ((x, y, z), (fx, fy, fz), (ex, ey, ez)), down
+
+    def _plain_points(self, q_rad: Vec6) -> tuple[tuple[Vec3, Vec3, Vec3], float]:
+        """Return the same for an arm of the UR family, its three parallel joints taken together.
+
+        The rows multiplied out, as in Hawkins 2013, "Analytic Inverse Kinematics for the Universal Robots
+        UR-5/UR-10 Arms"; the tool centre point lies on the flange's axis.
+        """
+        sin, cos = math.sin, math.cos
+        q1, q2, q3, q4, q5, _ = q_rad
+        d1, a2, a3, d4, d5, d6, tcp_m = self._plain
+        q23 = q2 + q3
+        s1, c1, s2, c2, s5 = sin(q1), cos(q1), sin(q2), cos(q2), sin(q5)
+        s234, c234 = sin(q23 + q4), cos(q23 + q4)
+        ahead, aside, up = -c234 * s5, cos(q5), -s234 * s5  # of the approach axis, in the arm's plane and across it
+        ax, ay = c1 * ahead + s1 * aside, s1 * ahead - c1 * aside
+        out = a2 * c2 + a3 * cos(q23) + d5 * s234
+        x, y = c1 * out + s1 * d4 + d6 * ax, s1 * out - c1 * d4 + d6 * ay
+        z = d1 + a2 * s2 + a3 * sin(q23) - d5 * c234 + d6 * up
+        ex, ey, ez = self._elbow
+        eu, ev = c2 * (ex + a2) - s2 * ey, s2 * (ex + a2) + c2 * ey
+        elbow = (c1 * eu + s1 * ez, s1 * eu - c1 * ez, d1 + ev)
+        return ((x + tcp_m * ax, y + tcp_m * ay, z + tcp_m * up), (x, y, z), elbow), -up
 
     def lowest_m(self, tcp_m: Vec3, down: float) -> float:
         """Return the height of the lowest fingertip of an open hand, metres, from what `points` returns.

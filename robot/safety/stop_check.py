@@ -129,7 +129,8 @@ class StopCheck:
     def _inside(self, q: Vec6) -> tuple[float, Vec3, float]:
         """Return how far inside its fences the tool is, where it is, and how high its lowest fingertip."""
         (x0, y0, z0), (x1, y1, z1) = self._limits.workspace_m
-        tcp, lowest_m = self._chain.tcp_and_lowest(q)
+        (tcp, _, _), down = self._chain.points(q)
+        lowest_m = self._chain.lowest_m(tcp, down)
         x, y, z = tcp
         inside_m = min(x - x0, x1 - x, y - y0, y1 - y, z - z0, z1 - z, lowest_m - self._limits.tip_min_m)
         return inside_m, tcp, lowest_m

@@ -65,6 +65,19 @@ def test_placo_agrees_with_the_chain(q):
 
 
 @given(JOINTS)
+def test_the_rows_multiplied_out_are_the_rows_one_by_one(q):
+    """Two ways to the same points: one for arms of the family whose tool lies on its axis, one for any."""
+    beside = ToolChain(
+        msgspec.structs.replace(ARM, tool=msgspec.structs.replace(ARM.tool, tcp_m=(1e-300, 0.0, 0.1628)))
+    )
+    assert ARM.tool.tcp_m == (0.0, 0.0, 0.1628)
+    (plain, plain_down), (rows, rows_down) = CHAIN.points(q), beside.points(q)
+    assert np.allclose(plain, rows, rtol=0.0, atol=1e-12)
+    assert plain_down == pytest.approx(rows_down, abs=1e-12)
+    assert CHAIN.tcp(q) == pytest.approx(plain[0], abs=1e-12)
+
+
+@given(JOINTS)
 def test_the_chains_quaternion_is_the_tables_rotation(q):
     R = np.zeros(9)
     mujoco.mju_quat2Mat(R, np.array(CHAIN.quat(q)))
