@@ -5,8 +5,8 @@ caller resumes the program's motions and then ends the slice. A motion that retu
 a servo, a speed) leaves a tail that goes on until the next motion takes over, in the very slice that follows.
 """
 
-from collections.abc import Callable, Generator, Sequence
-from typing import Protocol
+import math
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -14,63 +14,27 @@ from sim_twin.controller.motion.force import ForceLaw, ForceTask
 from sim_twin.controller.motion.kinematics import ArmKinematics, joint_speeds_of
 from sim_twin.controller.motion.paths import Path
 from sim_twin.controller.motion.poses import Array, matrix_from_pose, pose_from_matrix, vec6
-from sim_twin.controller.motion.profiles import Residual, Trapezoid
-from sim_twin.controller.motion.servo import ServoFilter, limited
+from sim_twin.controller.motion.profiles import Residual, Trapezoid, way_back
+from sim_twin.controller.motion.servo import limited
 from sim_twin.controller.motion.setpoint import SLICE_S, Pace, SetPoint
+from sim_twin.controller.motion.tails import Motion, MotionConflictError, Sensed, Tail
 
 __all__ = ["STOP_RAD_S2", "Motion", "MotionConflictError", "MotionCore", "Sensed", "Tail"]
-
-Motion = Generator[None, None, None]
 
 STOP_RAD_S2 = np.array([25.0, 8.4, 45.0, 45.0, 45.0, 45.0])
 """With 35 ms of the servo's lag a stop from full speed takes what UR publishes for the CB3 UR5 (J0 0.31 rad in 244 ms,
 J1 0.70 in 530, J2 0.22 in 164; UR5e has graphs only). The wrists have no figures: they stop as the elbow does."""
 REST_RAD_S2 = 10.0
 """Deceleration of a motion that its program abandoned."""
-BACK_RAD_S2 = 1.4
-"""Greatest acceleration of coming back onto a path after a stop."""
 STILL_RAD_S = 1e-6
+LEAST_RATE = 1e-3
 LEAST_PACE = 0.02
-"""Below this pace the speed of what is taken over counts as it is, not as what it would be at full pace."""
+"""Below this pace what is taken over runs out by the clock."""
+MOST_OFFSET = 10.0
+"""A tool's offset beyond it (m, rad) is a slip, and great ones would overflow."""
 FREEDRIVE_SHARE = 0.9
 """How much of the servo's damping freedrive takes away; at 1 a push would never come to rest."""
 TIME_EPSILON_S = 1e-9
-
-
-class MotionConflictError(RuntimeError):
-    """Two threads of a program moved the arm in one slice."""
-
-
-class Sensed(Protocol):
-    """What motions need of a measurement."""
-
-    @property
-    def q_rad(self) -> Array:
-        """Joint angles."""
-        ...
-
-    @property
-    def qd_rad_s(self) -> Array:
-        """Joint speeds."""
-        ...
-
-    @property
-    def wrench(self) -> Array:
-        """Force and torque of the world on the tool, at the tool, base axes."""
-        ...
-
-
-class Tail:
-    """What goes on after a motion returned.
-
-    Args:
-        motion: Resumed once a slice while nobody drives.
-        anchor_rad: Where it would come to rest, if the next motion is to begin there (a blend).
-        servo: Its filter, if it is servoj's.
-    """
-
-    def __init__(self, motion: Motion, *, anchor_rad: Array | None = None, servo: ServoFilter | None = None) -> None:
-        self.motion, self.anchor_rad, self.servo = motion, anchor_rad, servo
 
 
 class MotionCore:
@@ -106,6 +70,8 @@ class MotionCore:
         self._nominal_before = setpoint.q_target
         self._shift = np.zeros(6)
         self._is_driven = self._was_driven = False
+        self._gear: float | None = None
+        self._pace_driven = 1.0
         self._n_stops = 0
         self._law: ForceLaw | None = None
         self._free_axes: Array | None = None
@@ -113,8 +79,15 @@ class MotionCore:
     # ------------------------------------------------------------------------------------------------ tool and poses
 
     def set_tcp(self, offset: Sequence[float] | Array) -> None:
-        """Set the tool's pose in the flange frame, a UR pose; running moves keep theirs."""
-        self.T_ft = matrix_from_pose(vec6(offset, "tool offset"))
+        """Set the tool's pose in the flange frame, a UR pose; running moves keep theirs.
+
+        Raises:
+            ValueError: it is further from the flange than any tool.
+        """
+        pose = vec6(offset, "tool offset")
+        if not (np.abs(pose) <= MOST_OFFSET).all():
+            raise ValueError(f"tool offset: expected within {MOST_OFFSET:g} m and rad, got {pose.tolist()}")
+        self.T_ft = matrix_from_pose(pose)
 
     @property
     def tcp_offset(self) -> Array:
@@ -140,8 +113,8 @@ class MotionCore:
 
     # --------------------------------------------------------------------------------------------------- one slice
 
-    def put(self, q_rad: Array) -> None:
-        """Drive the set-point in this slice.  (6,)
+    def claim(self) -> None:
+        """Take this slice for one motion.
 
         Raises:
             MotionConflictError: somebody did already.
@@ -151,6 +124,23 @@ class MotionCore:
                 "expected one motion at a time, got a second in the same slice; kill the other thread"
             )
         self._is_driven = True
+
+    def release(self) -> None:
+        """Give this slice back: who claimed it moves nothing."""
+        self._is_driven = False
+
+    def put(self, q_rad: Array, *, gear: float | None = None) -> None:
+        """Drive the set-point in this slice.  (6,)
+
+        Args:
+            q_rad: Where to.
+            gear: How much faster its time passes than the pace; None if it goes by the clock (see `begin`).
+
+        Raises:
+            MotionConflictError: somebody did already.
+        """
+        self.claim()
+        self._gear = gear
         self._nominal_before, self.nominal_rad = self.nominal_rad, q_rad
 
     def end_slice(self, sensed: Sensed) -> None:
@@ -166,6 +156,7 @@ class MotionCore:
         if self._law is not None:
             self._shift = self._complied(self._law, sensed) - self.nominal_rad
         self.setpoint.move(self.nominal_rad + self._shift)
+        self._pace_driven = self.pace.scale
         self.pace.step()
 
     @property
@@ -225,50 +216,79 @@ class MotionCore:
     def begin(self, ramp_s: Callable[[Array], float]) -> tuple[Array, Residual | None]:
         """Take over for a path, and return where it begins and what is left of the motion before.
 
+        What is left of a path runs out in the time of paths, at the speed that it has at full pace. Speeds, servos and
+        stops know no such time: theirs runs out by the clock, and slower only while the pace falls from what it is.
+
         Args:
             ramp_s: How long stopping takes from a joint speed, where the motion before does not say where it rests.
         """
         tail, self.tail = self.tail, None
-        pace = self.pace.scale if self.pace.scale > LEAST_PACE else 1.0
         # What complies is not handed on: force mode goes on complying by itself.
         complying = self._law is not None
         speed = self.nominal_speed_rad_s if complying else self.setpoint.qd_target
-        speed = speed / pace
+        gear, rate = self._taken_at()
         self._seat()
         q = self.setpoint.q_target
-        if float(np.abs(speed).max()) < STILL_RAD_S:
+        fastest = float(np.abs(speed).max())
+        if fastest < STILL_RAD_S:
             return q, None
+        speed = speed / rate
         if tail is not None and tail.anchor_rad is not None:
             offset = q - tail.anchor_rad
             duration = -2.0 * float(offset @ speed) / float(speed @ speed)
             if duration > SLICE_S:
-                return tail.anchor_rad, Residual(offset, speed, duration)
-        duration = max(ramp_s(speed), SLICE_S)
-        return q + speed * duration / 2.0, Residual(-speed * duration / 2.0, speed, duration)
+                return tail.anchor_rad, Residual(offset, speed, duration, gear)
+        duration = ramp_s(speed)
+        if self.pace.is_paused and gear == math.inf:
+            duration = min(duration, fastest / REST_RAD_S2)
+        duration = max(duration, SLICE_S)
+        return q + speed * duration / 2.0, Residual(-speed * duration / 2.0, speed, duration, gear)
+
+    def _taken_at(self) -> tuple[float, float]:
+        """Return the gear for what is left of the motion before, and the rate that its speed was made at."""
+        scale, gear = self.pace.scale, self._gear
+        if gear is not None and min(1.0, gear * self._pace_driven) > LEAST_RATE:
+            return gear, min(1.0, gear * self._pace_driven)
+        return (1.0 / scale if scale > LEAST_PACE else math.inf), 1.0
 
     def follow(self, path: Path, profile: Trapezoid, residual: Residual | None) -> Motion:
         """Follow a path to its end while the residual of the motion before runs out.
 
         Resumed after a stop that left the path, it comes back to where it was and goes on.
         """
-        t, begun_s, n_stops = 0.0, 0.0, self._n_stops
+        t, run_s, n_stops = 0.0, 0.0, self._n_stops
+        q = path.at(0.0)
         while True:
-            t += SLICE_S * self.pace.scale
-            q = path.at(profile.at(t)[0])
+            t, q = self._next(path, profile, t, q)
             if n_stops != self._n_stops:
-                n_stops, begun_s = self._n_stops, t
-                residual = _back(self.begin_free_at() - q)
-            left = residual.at(t - begun_s) if residual else None
-            self.put(q if left is None else q + left[0])
+                n_stops, run_s = self._n_stops, 0.0
+                residual = way_back(self.begin_free_at() - q)
+            elif residual is not None:
+                run_s += SLICE_S * residual.rate(self.pace.scale)
+            left = residual.at(run_s) if residual else None
+            if residual is None or left is None:
+                self.put(q, gear=1.0)
+            else:
+                self.put(q + left[0], gear=residual.gear)
             yield
             if t >= profile.duration_s - TIME_EPSILON_S and left is None:
                 return
+
+    def _next(self, path: Path, profile: Trapezoid, t: float, q: Array) -> tuple[float, Array]:
+        """Return time and joints of a path's next slice: less of it where a joint would pass its speed."""
+        step = SLICE_S * self.pace.scale
+        ahead = path.at(profile.at(t + step)[0])
+        share = float((np.abs(ahead - q) / self.speed_rad_s).max()) / SLICE_S
+        if share <= 1.0 + TIME_EPSILON_S:
+            return t + step, ahead
+        return t + step / share, path.at(profile.at(t + step / share)[0])
 
     def begin_stop(self) -> None:
         """Leave everything and stop as fast as the arm may: every joint in proportion, so that it stays on its line."""
         speed = self.begin_free()
         self._n_stops += 1
         self._law, self._free_axes = None, None
+        self._gear = None
         self.tail = self._stop_tail = Tail(self._stopping(speed))
 
     @property
@@ -300,6 +320,7 @@ class MotionCore:
         self._n_stops += 1
         self.setpoint.place(q_rad)
         self._is_driven = self._was_driven = False
+        self._gear = None
         self._seat()
 
     def catch(self, q_rad: Array, qd_rad_s: Array) -> None:
@@ -342,6 +363,8 @@ class MotionCore:
         if self._law is None:
             return
         self._law = None
+        # What complied went by the clock.
+        self._gear = None
         if not self._was_driven and not self._is_driven:
             self._seat()
 
@@ -373,8 +396,3 @@ class MotionCore:
     def is_free(self) -> bool:
         """Freedrive is on."""
         return self._free_axes is not None
-
-
-def _back(offset: Array) -> Residual:
-    """Return the way back onto a path, from rest."""
-    return Residual(offset, np.zeros(6), max(0.2, float(np.sqrt(6.0 * np.abs(offset).max() / BACK_RAD_S2))))

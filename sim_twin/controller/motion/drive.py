@@ -40,7 +40,6 @@ BRAKE_SOLIMP = (0.9999, 0.9999)
 N_HISTORY = 1000
 MOST_TOLD_KG, MOST_TOLD_M = 100.0, 10.0
 """Numbers beyond these are a slip, and great ones would overflow to a force that no limit compares with."""
-NOWHERE_M = np.zeros(3)
 
 
 class Measured(msgspec.Struct, frozen=True, kw_only=True):
@@ -70,7 +69,7 @@ def servo_lag_s(model: mujoco.MjModel, actuator: int, *, tick_s: float) -> float
 
 MOST_EXTRA_KG = 20.0
 FELT_S = 0.02
-"""Time constant of the forces that collisions and the force limit are judged by. A guess: UR publishes none."""
+"""Time constant of the forces and speeds that limits are judged by. A guess: UR publishes none."""
 
 
 class TwinDrive:
@@ -137,6 +136,7 @@ class TwinDrive:
         model.dof_frictionloss[:6] = BRAKE_NM
         model.dof_solimp[:6, :2] = BRAKE_SOLIMP
         self.is_braked = True
+        self._feel_anew()
         self._seat()
 
     def engage(self) -> None:
@@ -145,6 +145,7 @@ class TwinDrive:
         self._give_servos()
         model.dof_frictionloss[:6] = 0.0
         self.is_braked = False
+        self._feel_anew()
         self._seat()
 
     def put_torque(self, torque_nm: Sequence[float] | Array) -> None:
@@ -153,17 +154,24 @@ class TwinDrive:
         Without effect while paused.
 
         Raises:
+            MotionConflictError: another motion moves the arm in this slice.
             ValueError: they are not six finite numbers.
         """
         torque = vec6(torque_nm, "joint torques")
         greatest = np.array([j.torque_nm for j in self.world.arm.joints])
         if not self.core.pace.is_paused:
+            self.core.claim()
             self._torque_nm = np.clip(torque, -greatest, greatest)
 
     def stiffen(self) -> None:
         """Let nothing comply nor be led, nor torques move the joints: no program may move."""
-        self._torque_nm = None
+        self._drop_torque()
         self.core.stiffen()
+
+    def _drop_torque(self) -> None:
+        if self._torque_nm is not None:
+            self._torque_nm = None
+            self.core.release()
 
     def _cut_servos(self) -> None:
         model = self.world.model
@@ -179,7 +187,6 @@ class TwinDrive:
 
     def _seat(self, moving_rad_s: Array | None = None) -> None:
         """Hold the joints where they are; joints that move are braked."""
-        self._felt_force_n, self._felt_nm = 0.0, np.zeros(6)
         q = self.world.data.qpos[:6].copy()
         self.world.data.ctrl[self._controls] = q
         self._expected = q
@@ -187,6 +194,11 @@ class TwinDrive:
             self.core.hold(q)
         else:
             self.core.catch(q, moving_rad_s)
+
+    def _feel_anew(self) -> None:
+        """Forget what was felt before the power was cut or given."""
+        self._felt_force_n, self._felt_nm = 0.0, np.zeros(6)
+        self._felt_rad_s, self._felt_m_s = self.world.data.qvel[:6].copy(), 0.0
 
     # ------------------------------------------------------------------------------------------------------ sensing
 
@@ -265,7 +277,9 @@ class TwinDrive:
         self._history.append(self.measured.q_rad)
         self.contact.push(self.measured.wrench[:3], self.measured.tcp_speed[:3])
         if breach is None and not self.is_braked:
-            breach = breach_felt(self.limits, self._felt())
+            felt = self._felt()
+            # Nobody asked for where torques lead: what is measured is judged as what is asked.
+            breach = breach_felt(self.limits, felt) or (None if torque_nm is None else self._led_beyond())
             if breach is not None:
                 self.stop(is_cut=breach.cause.is_violation)
         return breach
@@ -275,7 +289,7 @@ class TwinDrive:
         if is_cut:
             self.lock()
         elif not self.is_braked:
-            self._torque_nm = None
+            self._drop_torque()
             self.core.begin_stop()
 
     def obey(self, order: MotionOrder) -> None:
@@ -323,21 +337,37 @@ class TwinDrive:
         return breach
 
     def _asked_tool_m(self) -> Array:
-        """Where the set-point brings the tool; of no interest where there is no plane."""
-        return self.core.tool_at(self.motions.setpoint.q_target)[:3, 3] if self.limits.planes else NOWHERE_M
+        """Where the set-point brings the tool."""
+        return self.core.tool_at(self.motions.setpoint.q_target)[:3, 3]
+
+    def _led_beyond(self) -> Breach | None:
+        now = self.measured
+        tool_m = now.tcp_pose[:3]
+        led = Asked(
+            q_rad=now.q_rad,
+            qd_rad_s=now.qd_rad_s,
+            tool_m=tool_m,
+            tool_before_m=tool_m - now.tcp_speed[:3] * SLICE_S,
+        )
+        return breach_asked(self.limits, led)
 
     def _felt(self) -> Felt:
-        """What the limits are judged by. Forces are smoothed: a blow of a millisecond passes through no real sensor."""
+        """What the limits are judged by. Forces and speeds are smoothed.
+
+        A blow of a millisecond passes through no real sensor, and a servo's overshoot is no runaway.
+        """
         now = self.measured
         share = SLICE_S / (SLICE_S + FELT_S)
         self._felt_force_n += share * (length(now.wrench[:3]) - self._felt_force_n)
         self._felt_nm += share * (now.external_nm - self._felt_nm)
+        self._felt_rad_s += share * (now.qd_rad_s - self._felt_rad_s)
+        self._felt_m_s += share * (length(now.tcp_speed[:3]) - self._felt_m_s)
         return Felt(
             q_rad=now.q_rad,
-            qd_rad_s=now.qd_rad_s,
+            qd_rad_s=self._felt_rad_s,
             q_expected_rad=self._expected,
             tool_m=now.tcp_pose[:3],
-            tool_speed_m_s=length(now.tcp_speed[:3]),
+            tool_speed_m_s=self._felt_m_s,
             force_n=self._felt_force_n,
             external_nm=self._felt_nm,
         )

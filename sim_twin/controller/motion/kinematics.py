@@ -125,6 +125,10 @@ class ArmKinematics:
         """Return J with (v, w) = J qd at the tool, base axes.  (6,), (4, 4) -> (6, 6)"""
         return self.forward_and_jacobian(q_rad, T_ft)[1]
 
+    def tool_speed(self, q_rad: Array, qd_rad_s: Array, T_ft: Array | None = None) -> float:
+        """Return how fast the tool moves, m/s.  (6,), (6,), (4, 4) -> ()"""
+        return float(np.linalg.norm(self.jacobian(q_rad, T_ft)[:3] @ qd_rad_s))
+
     def joint_speeds(self, q_rad: Array, twist: Array, T_ft: Array | None = None) -> Array:
         """Return the joint speeds of a tool speed (v, w) in base axes.  (6,), (6,) -> (6,)
 

@@ -1,7 +1,9 @@
 """What a slice may ask and what may be measured: which stop the first breach brings. Pure.
 
 Two tiers, as on a robot: what is *asked* beyond a limit brings a protective stop, and what is *measured* beyond a
-limit and its tolerance (the trueness of the e-Series' safety functions) is a violation and cuts the drives.
+limit and its tolerance (the trueness of the e-Series' safety functions) is a violation and cuts the drives. Measured
+speeds, which a servo's overshoot takes beyond what was asked, have both: a protective stop beyond the tolerance, a
+violation where they run away.
 """
 
 import math
@@ -17,6 +19,7 @@ from sim_twin.controller.motion.setpoint import SLICE_S
 
 __all__ = ["Asked", "Breach", "Cause", "Felt", "Plane", "SafetyLimits", "breach_asked", "breach_felt", "default_limits"]
 
+ROUNDING = 1e-9
 JUMP_SPEEDS = 2.0
 """A change of more than this many slices at full speed is a jump, not a speed."""
 # Trueness of the e-Series' safety functions, from the manual.
@@ -25,6 +28,9 @@ JOINT_SPEED_TOLERANCE_RAD_S = float(np.radians(1.15))
 PLANE_TOLERANCE_M = 0.040
 SPEED_TOLERANCE_M_S = 0.050
 FORCE_TOLERANCE_N = 25.0
+# Measured speeds beyond these are violations; the figures that UR's pendant shows beside its limits, recalled.
+JOINT_RUNAWAY_RAD_S = float(np.radians(11.0))
+TOOL_RUNAWAY_M_S = 0.150
 
 
 class Cause(Enum):
@@ -37,6 +43,9 @@ class Cause(Enum):
     NOT_FINITE = (204, 0, False)
     JUMP = (204, 1, False)
     TARGET_SPEED = (204, 2, False)
+    TARGET_TOOL_SPEED = (0, 6, False)
+    JOINT_SPEED = (0, 7, False)
+    TOOL_SPEED = (0, 8, False)
     JOINT_LIMIT = (150, 0, False)
     PLANE = (152, 0, False)
     DEVIATION = (153, 0, False)
@@ -142,7 +151,7 @@ def breach_asked(limits: SafetyLimits, asked: Asked) -> Breach | None:
     if i is not None:
         jump = speed[i] * SLICE_S
         return _breach(Cause.JUMP, i, f"target jumped by {jump:.3f} rad in one slice; send nearer targets")
-    i = _first(v - most * (1.0 + 1e-9) for v, most in zip(speed, limits.speed_rad_s, strict=True))
+    i = _first(v - most * (1.0 + ROUNDING) for v, most in zip(speed, limits.speed_rad_s, strict=True))
     if i is not None:
         return _breach(Cause.TARGET_SPEED, i, f"target moves at {speed[i]:.2f} rad/s, beyond its limit")
     # Who stands beyond a limit may stand there and come back.
@@ -150,6 +159,10 @@ def breach_asked(limits: SafetyLimits, asked: Asked) -> Breach | None:
     i = _first((x - high if v > 0.0 else low - x) if v else 0.0 for x, v, low, high in ranges)
     if i is not None:
         return _breach(Cause.JOINT_LIMIT, i, f"target {q[i]:.3f} rad is beyond the joint's limit")
+    tool_m_s = math.dist(asked.tool_m.tolist(), asked.tool_before_m.tolist()) / SLICE_S
+    if not tool_m_s <= limits.tool_speed_m_s * (1.0 + ROUNDING):
+        text = f"target moves the tool at {tool_m_s:.2f} m/s, limit {limits.tool_speed_m_s:.2f}"
+        return Breach(cause=Cause.TARGET_TOOL_SPEED, text=text)
     leaving = tuple(p for p in limits.planes if float(np.dot(p.normal, asked.tool_m - asked.tool_before_m)) < 0.0)
     if _is_outside(leaving, asked.tool_m, 0.0):
         return Breach(cause=Cause.PLANE, text="target position is beyond a safety plane")
@@ -167,13 +180,10 @@ def _violation(limits: SafetyLimits, felt: Felt) -> Breach | None:
     i = _first(max(x - high, low - x) - JOINT_TOLERANCE_RAD for x, low, high in ranges)
     if i is not None:
         return _breach(Cause.JOINT_VIOLATION, i, f"joint at {q[i]:.3f} rad is beyond its limit")
-    speed = [abs(v) for v in felt.qd_rad_s.tolist()]
-    i = _first(v - most - JOINT_SPEED_TOLERANCE_RAD_S for v, most in zip(speed, limits.speed_rad_s, strict=True))
-    if i is not None:
-        return _breach(Cause.JOINT_SPEED_VIOLATION, i, f"joint turns at {speed[i]:.2f} rad/s, beyond its limit")
-    if felt.tool_speed_m_s > limits.tool_speed_m_s + SPEED_TOLERANCE_M_S:
-        text = f"tool moves at {felt.tool_speed_m_s:.2f} m/s, limit {limits.tool_speed_m_s:.2f}"
-        return Breach(cause=Cause.TOOL_SPEED_VIOLATION, text=text)
+    too_fast = _too_fast(limits, felt, JOINT_RUNAWAY_RAD_S, Cause.JOINT_SPEED_VIOLATION)
+    too_fast = too_fast or _tool_too_fast(limits, felt, TOOL_RUNAWAY_M_S, Cause.TOOL_SPEED_VIOLATION)
+    if too_fast is not None:
+        return too_fast
     if _is_outside(limits.planes, felt.tool_m, PLANE_TOLERANCE_M):
         return Breach(cause=Cause.PLANE_VIOLATION, text="tool is beyond a safety plane")
     if felt.force_n > limits.tool_force_n + FORCE_TOLERANCE_N:
@@ -182,7 +192,23 @@ def _violation(limits: SafetyLimits, felt: Felt) -> Breach | None:
     return None
 
 
+def _too_fast(limits: SafetyLimits, felt: Felt, tolerance_rad_s: float, cause: Cause) -> Breach | None:
+    speed = [abs(v) for v in felt.qd_rad_s.tolist()]
+    i = _first(v - most - tolerance_rad_s for v, most in zip(speed, limits.speed_rad_s, strict=True))
+    return None if i is None else _breach(cause, i, f"joint turns at {speed[i]:.2f} rad/s, beyond its limit")
+
+
+def _tool_too_fast(limits: SafetyLimits, felt: Felt, tolerance_m_s: float, cause: Cause) -> Breach | None:
+    if felt.tool_speed_m_s <= limits.tool_speed_m_s + tolerance_m_s:
+        return None
+    return Breach(cause=cause, text=f"tool moves at {felt.tool_speed_m_s:.2f} m/s, limit {limits.tool_speed_m_s:.2f}")
+
+
 def _collision(limits: SafetyLimits, felt: Felt) -> Breach | None:
+    too_fast = _too_fast(limits, felt, JOINT_SPEED_TOLERANCE_RAD_S, Cause.JOINT_SPEED)
+    too_fast = too_fast or _tool_too_fast(limits, felt, SPEED_TOLERANCE_M_S, Cause.TOOL_SPEED)
+    if too_fast is not None:
+        return too_fast
     outside = [abs(v) for v in felt.external_nm.tolist()]
     i = _first(v - most for v, most in zip(outside, limits.collision_nm, strict=True))
     if i is not None:

@@ -8,7 +8,7 @@ from sim_twin.controller.motion.kinematics import ArmKinematics
 from sim_twin.controller.motion.moves import Moves
 from sim_twin.controller.motion.poses import Array
 from sim_twin.controller.motion.servoing import Servoing
-from sim_twin.controller.motion.setpoint import SetPoint
+from sim_twin.controller.motion.setpoint import USED_SPEED, SetPoint
 from sim_twin.controller.motion.speeds import Speeds
 
 __all__ = ["Motions"]
@@ -36,7 +36,7 @@ class Motions:
         self.core = MotionCore(
             kinematics=kinematics,
             setpoint=self.setpoint,
-            speed_rad_s=np.array([j.speed_rad_s for j in arm.joints]),
+            speed_rad_s=USED_SPEED * np.array([j.speed_rad_s for j in arm.joints]),
             acceleration_rad_s2=np.array([j.acceleration_rad_s2 for j in arm.joints]),
             servo_lag_s=servo_lag_s,
             dead_time_s=arm.servo.dead_time_s,

@@ -9,12 +9,14 @@ from sim_twin.controller.motion.core import Motion, MotionCore, Tail
 from sim_twin.controller.motion.paths import TURN_M_PER_RAD, ArcPath, JointPath, LinePath, Path, ToolPath, TrackedPath
 from sim_twin.controller.motion.poses import Array, matrix_from_pose, vec6
 from sim_twin.controller.motion.profiles import Residual, Trapezoid
+from sim_twin.controller.motion.setpoint import USED_SPEED
 
 __all__ = ["Moves"]
 
 Numbers = Sequence[float] | Array
-TOOL_M_S = 3.0
-"""Greatest speed of the tool: what UR's clients take for it, and where the default safety limit is."""
+TOOL_M_S = 3.0 * USED_SPEED
+"""Greatest speed of the tool on a path: what UR's clients take for it, where the default safety limit is, less what the
+servos overshoot."""
 NO_RATE = 1e-9
 
 
@@ -122,7 +124,8 @@ class Moves:
         core = self._core
         rates = np.maximum(path.rates, NO_RATE)
         v, a = float(np.min(core.speed_rad_s / rates)), float(np.min(core.acceleration_rad_s2 / rates))
-        return (v if isinstance(path, JointPath) else min(v, TOOL_M_S)), a
+        tool_rate = path.tool_rate(core.kinematics, core.T_ft) if isinstance(path, JointPath) else 1.0
+        return min(v, TOOL_M_S / max(tool_rate, NO_RATE)), a
 
     def _tool_ramp_s(self, speed: Array, a: float) -> float:
         twist = self._core.kinematics.jacobian(self._core.setpoint.q_target, self._core.T_ft) @ speed

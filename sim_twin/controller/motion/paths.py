@@ -17,6 +17,10 @@ CHECK_M = 0.03
 """A path is walked in steps of this length before it begins; each costs about 60 us of the first slice."""
 
 
+CHECK_RAD = 0.1
+"""A joint path's tool is looked at in steps of this turn."""
+
+
 class PathError(ValueError):
     """The way-points make no path."""
 
@@ -54,6 +58,14 @@ class JointPath:
         self.length = float(np.abs(end_rad - start_rad).max())
         self._rates = (end_rad - start_rad) / self.length if self.length else np.zeros(6)
         self.rates: Array = np.abs(self._rates)
+
+    def tool_rate(self, kinematics: ArmKinematics, T_ft: Array) -> float:
+        """Return how far the tool goes at most while the leading joint turns by one radian (m), sampled."""
+        n = max(1, math.ceil(self.length / CHECK_RAD))
+        return max(
+            kinematics.tool_speed(self._start + self.length * k / n * self._rates, self._rates, T_ft)
+            for k in range(n + 1)
+        )
 
     def at(self, s: float) -> Array:
         """Return the joints at a turn of the leading joint.  () -> (6,)"""

@@ -6,7 +6,10 @@ import numpy as np
 
 from sim_twin.controller.motion.poses import Array
 
-__all__ = ["Residual", "Trapezoid"]
+__all__ = ["Residual", "Trapezoid", "way_back"]
+
+BACK_RAD_S2 = 1.4
+"""Greatest acceleration of coming back onto a path after a stop."""
 
 
 class Trapezoid:
@@ -56,14 +59,19 @@ class Residual:
         offset: Where the set-point is, seen from the new motion's start.  (6,)
         speed: How fast it moves.  (6,)
         duration_s: T.
+        gear: How much faster its time passes than that of paths, where that is slowed down.
     """
 
-    def __init__(self, offset: Array, speed: Array, duration_s: float) -> None:
-        self.duration_s = duration_s
+    def __init__(self, offset: Array, speed: Array, duration_s: float, gear: float = 1.0) -> None:
+        self.duration_s, self.gear = duration_s, gear
         self._offset, self._speed = offset, speed
         T = duration_s
         self._c2 = -(3.0 * offset + 2.0 * T * speed) / T**2 if T > 0.0 else np.zeros_like(offset)
         self._c3 = (2.0 * offset + T * speed) / T**3 if T > 0.0 else np.zeros_like(offset)
+
+    def rate(self, pace: float) -> float:
+        """Return how fast its time passes at a pace: never faster than the clock."""
+        return min(1.0, self.gear * pace) if math.isfinite(self.gear) else 1.0
 
     def at(self, t_s: float) -> tuple[Array, Array, Array] | None:
         """Return offset, speed and acceleration at a time, or None when nothing is left.  () -> (6,), (6,), (6,)"""
@@ -72,3 +80,8 @@ class Residual:
         q = self._offset + t_s * (self._speed + t_s * (self._c2 + t_s * self._c3))
         qd = self._speed + t_s * (2.0 * self._c2 + 3.0 * t_s * self._c3)
         return q, qd, 2.0 * self._c2 + 6.0 * t_s * self._c3
+
+
+def way_back(offset: Array) -> Residual:
+    """Return the way back onto a path from an offset, from rest.  (6,) -> Residual"""
+    return Residual(offset, np.zeros(6), max(0.2, float(np.sqrt(6.0 * np.abs(offset).max() / BACK_RAD_S2))))

@@ -4,10 +4,12 @@ import numpy as np
 
 from sim_twin.controller.motion.poses import Array
 
-__all__ = ["SLICE_S", "Pace", "SetPoint"]
+__all__ = ["SLICE_S", "USED_SPEED", "Pace", "SetPoint"]
 
 SLICE_S = 0.002
 """UR's e-Series run at 500 slices a second."""
+USED_SPEED = 0.97
+"""Share of the greatest speeds that motions use: the servos' overshoot fits into the rest."""
 PACE_PER_S = 4.0
 """How fast the pace changes: a pause comes to rest within a quarter of a second."""
 

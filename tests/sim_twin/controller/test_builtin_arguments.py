@@ -65,6 +65,8 @@ def test_no_argument_brings_out_anything_but_plain_words(robot):
         (f"set_payload(1, [{NOT_A_NUMBER}, 0, 0])", "set_payload(): expected 3 finite numbers"),
         (f"set_payload_cog([0, {NOT_A_NUMBER}, 0])", "set_payload_cog(): expected 3 finite numbers"),
         (f"set_payload({INFINITE})", "expected 0 to 100 kg"),
+        ("set_tcp(p[0, 0, 1e300, 0, 0, 0])", "tool offset: expected within 10 m"),
+        ("set_tcp(p[0, 0, 0, 0, 11, 0])", "tool offset: expected within 10 m and rad"),
         ("set_payload(1e300)", "expected 0 to 100 kg"),
         ("set_payload(1, [0, 1e300, 0])", "expected a centre of gravity within 10 m"),
         (f"set_gravity([0, 0, {NOT_A_NUMBER}])", "set_gravity(): expected 3 finite numbers"),

@@ -6,10 +6,12 @@ import msgspec
 import numpy as np
 import pytest
 
+from sim_twin.controller.motion.limits import Plane
 from sim_twin.controller.states import Event, RobotMode, RuntimeState, SafetyMode
 from sim_twin.controller.wire import ControllerVersion, Outcome, output_fields
 from tests.support.virtual_robot import FOREVER, ended, lines, make_robot, run, started, state_of
 
+NEWEST = ControllerVersion(minor=26)
 STOPPED, PLAYING, PAUSED = RuntimeState.STOPPED, RuntimeState.PLAYING, RuntimeState.PAUSED
 
 
@@ -97,3 +99,81 @@ def test_noise_is_seen_by_interfaces_and_not_by_physics():
     off = np.array(robot.outputs["actual_q"]()) - robot.machine.world.data.qpos[:6]
     assert off == pytest.approx(bias)
     assert robot.machine.modes.safety is SafetyMode.NORMAL
+
+
+PRESS = """def f():
+ p = get_target_tcp_pose()
+ p[2] = p[2] - 0.2
+ movel(p, a=2, v=0.3)
+ q0 = get_actual_joint_positions()
+ w = 0
+ while True:
+  q = get_actual_joint_positions()
+  d = get_actual_joint_speeds()
+  w = w + 0.4
+  direct_torque([400*(q0[0]-q[0])-30*d[0], w-30*d[1], 800*(q0[2]-q[2])-30*d[2], 200*(q0[3]-q[3])-5*d[3],
+   200*(q0[4]-q[4])-5*d[4], 200*(q0[5]-q[5])-5*d[5]])
+ end
+end
+"""
+
+
+TURN = (
+    "def f():\n while True:\n  d = get_actual_joint_speeds()\n  direct_torque([20*({v}-d[0]),0,0,0,0,0])\n end\nend\n"
+)
+
+
+def test_torques_that_press_on_the_table_too_hard_are_a_protective_stop():
+    robot = started(PRESS, version=NEWEST)
+    seen = []
+
+    def is_stopped():
+        seen.append(float(np.linalg.norm(robot.machine.drive.measured.wrench[:3])))
+        return robot.machine.modes.safety is SafetyMode.PROTECTIVE_STOP
+
+    run(robot, 2000, is_stopped)
+    limit = robot.machine.drive.limits.tool_force_n
+    assert max(seen) < limit + 25
+    assert any("C158" in line for line in lines(robot))
+    run(robot, 500)
+    assert float(np.linalg.norm(robot.machine.drive.measured.wrench[:3])) < limit
+    assert robot.machine.modes.robot is RobotMode.RUNNING, "stopped before its drives were cut"
+
+
+def test_torques_lead_no_joint_beyond_its_limit():
+    robot = started(TURN.format(v=0.8), version=NEWEST)
+    drive = robot.machine.drive
+    most = drive.measured.q_rad[0] + 0.3
+    drive.limits = msgspec.structs.replace(drive.limits, q_max_rad=(most, *drive.limits.q_max_rad[1:]))
+    run(robot, 2000, lambda: robot.machine.modes.safety is SafetyMode.PROTECTIVE_STOP)
+    run(robot, 300)
+    assert any("C150" in line for line in lines(robot))
+    assert most < drive.measured.q_rad[0] < most + np.radians(5)
+    assert robot.machine.modes.robot is RobotMode.RUNNING
+
+
+def test_torques_lead_the_tool_beyond_no_plane():
+    robot = started(TURN.format(v=0.5), version=NEWEST)
+    drive = robot.machine.drive
+    edge = drive.measured.tcp_pose[1] + 0.05
+    drive.limits = msgspec.structs.replace(drive.limits, planes=(Plane(normal=(0.0, -1.0, 0.0), offset_m=-edge),))
+    run(robot, 2000, lambda: robot.machine.modes.safety is SafetyMode.PROTECTIVE_STOP)
+    run(robot, 300)
+    assert any("C152" in line for line in lines(robot))
+    assert drive.measured.tcp_pose[1] < edge + 0.04
+    assert robot.machine.modes.robot is RobotMode.RUNNING
+
+
+@pytest.mark.parametrize(
+    ("main", "thread"),
+    [("movej(q)", "direct_torque([2,0,0,0,0,0])"), ("while True:\n  direct_torque([2,0,0,0,0,0])\n end", "movej(q)")],
+)
+def test_a_move_beside_torques_is_a_conflict(main, thread):
+    text = (
+        "def f():\n q = get_actual_joint_positions()\n q[5] = q[5] + 0.5\n thread t():\n  while True:\n"
+        f"   {thread}\n  end\n end\n sync()\n h = run t()\n {main}\nend\n"
+    )
+    robot = started(text, version=NEWEST)
+    run(robot, 20)
+    assert state_of(robot) is RuntimeState.STOPPED
+    assert any("another thread" in line for line in lines(robot))

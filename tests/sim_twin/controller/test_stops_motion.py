@@ -23,6 +23,10 @@ MOTIONS = {
     "speedj": "while True:\n  speedj([0.5,0,0,0,0,0.5], 4, 0.002)\n end",
     "speedj, kept": "speedj([0.5,0,0,0,0,0.5], 4)\n while True:\n  sync()\n end",
     "speedj, gently": "speedj([1,0,0,0,0,0.5], 0.6, 20)",
+    "speedj, then movej": (
+        "while True:\n  q = get_actual_joint_positions()\n  speedj([1,0,0,0,0,0.5], 2, 0.3)\n  movej(q, a=2)\n end"
+    ),
+    "speedl, then movel": (UP + "while True:\n  speedl([0,0,0.1,0,0,0], 1, 0.3)\n  movel(p, a=1)\n end"),
     "speedl": "speedl([0,0,0.2,0,0,0], 2, 20)",
     "speedl, gently": "speedl([0,0,0.2,0,0,0], 0.2, 20)",
     "stopj, gently": "speedj([0.8,0,0,0,0,0.5], 8, 0.1)\n stopj(0.3)\n while True:\n  sync()\n end",
@@ -51,7 +55,11 @@ HAPPENINGS = (
     *(Event.SAFEGUARD_OPENED, Event.SAFEGUARD_CLOSED, Event.PLAY) * 2,
     *(Event.PAUSE, Event.STOP, Event.PROTECTIVE_STOP, Event.UNLOCK_PROTECTIVE_STOP),
     *("def", "sec"),
+    *(Event.ROBOT_ESTOP, Event.ROBOT_ESTOP_RELEASED, Event.BRAKE_RELEASE),
+    *(0.0, 0.05, 0.05, 0.5, 1.0),
 )
+FASTEST_RAD_S = 2.0
+"""No motion above asks for more, and no slider or stop may make it more; torques are under no speed's control."""
 
 
 def moving(motion, n=90):
@@ -131,6 +139,8 @@ def happen(robot, what, text):
         robot.submit_script("sec side():\n speedj([0.5,0,0,0,0,0], 1, 1)\nend\n")
     elif what == "def" or (what is Event.PLAY and state_of(robot) is STOPPED):
         robot.submit_script(text)
+    elif isinstance(what, float):
+        robot.machine.drive.core.pace.set_slider(what)
     elif what is Event.STOP:
         robot.programs.stop()
     else:
@@ -143,12 +153,13 @@ def test_whatever_happens_in_whatever_order_the_arm_rests_under_a_stop(seed):
     motion = sorted(MOTIONS)[draw.integers(len(MOTIONS))]
     robot = moving(motion, int(draw.integers(60, 120)))
     modes, core = robot.machine.modes, robot.machine.drive.core
-    modes.times = PowerTimes(n_before_unlock=100)
+    modes.times = PowerTimes(n_power_on=5, n_brake_release=5, n_before_unlock=100)
     n_pausing = n_quiet = 0
     for _ in range(draw.integers(3, 9)):
         happen(robot, HAPPENINGS[draw.integers(len(HAPPENINGS))], f"def moves():\n {MOTIONS[motion]}\nend\n")
         for _ in range(draw.choice((1, 3, 20, 80, 200, 350))):
             robot.step()
+            assert robot.machine.drive.motions.setpoint.fastest_rad_s < FASTEST_RAD_S or "torque" in motion
             state = state_of(robot)
             n_pausing = n_pausing + 1 if state is RuntimeState.PAUSING else 0
             n_quiet = n_quiet + 1 if modes.is_stopped_by_safety or state in (PAUSED, STOPPED) else 0

@@ -80,7 +80,8 @@ def test_what_is_asked_may_be_at_the_limit_and_not_beyond(joint, sign, field, li
     ("field", "limits", "cause", "is_violation"),
     [
         ("q_rad", [TWO_PI + np.radians(5)] * 6, Cause.JOINT_VIOLATION, True),
-        ("qd_rad_s", [PI + np.radians(1.15)] * 6, Cause.JOINT_SPEED_VIOLATION, True),
+        ("qd_rad_s", [PI + np.radians(1.15)] * 6, Cause.JOINT_SPEED, False),
+        ("qd_rad_s", [PI + np.radians(11)] * 6, Cause.JOINT_SPEED_VIOLATION, True),
         ("external_nm", LIMITS.collision_nm, Cause.JOINT_COLLISION, False),
         ("q_expected_rad", [LIMITS.deviation_rad] * 6, Cause.DEVIATION, False),
     ],
@@ -96,7 +97,8 @@ def test_what_is_felt_may_be_just_below_the_limit_and_not_just_above(joint, fiel
 @pytest.mark.parametrize(
     ("field", "limit", "cause"),
     [
-        ("tool_speed_m_s", 1.55, Cause.TOOL_SPEED_VIOLATION),
+        ("tool_speed_m_s", 1.55, Cause.TOOL_SPEED),
+        ("tool_speed_m_s", 1.65, Cause.TOOL_SPEED_VIOLATION),
         ("force_n", 250.0, Cause.TOOL_COLLISION),
         ("force_n", 275.0, Cause.FORCE_VIOLATION),
     ],
@@ -108,14 +110,24 @@ def test_speed_and_force_of_the_tool(field, limit, cause):
     assert above.cause is cause
 
 
+def test_a_tool_is_asked_to_go_at_its_limit_and_not_faster():
+    for way in (np.array([0.003, 0, 0]), np.array([0, -0.0018, 0.0024])):
+        assert breach_asked(LIMITS, asked(tool_m=TOOL + way * (1 - 1e-9), tool_before_m=TOOL)) is None
+        breach = breach_asked(LIMITS, asked(tool_m=TOOL + way * (1 + 1e-6), tool_before_m=TOOL))
+        assert breach is not None
+        assert (breach.cause, breach.cause.is_violation) == (Cause.TARGET_TOOL_SPEED, False)
+    assert breach_asked(LIMITS, asked(tool_m=TOOL * np.nan)) is not None
+
+
 def test_a_plane_stops_what_is_asked_and_four_centimetres_on_what_is_felt():
     def z(value):
         return np.array([0.3, 0, value])
 
-    assert breach_asked(LIMITS, asked(tool_m=z(0.1))) is None
-    assert breach_asked(LIMITS, asked(tool_m=z(0.1 - 1e-9))).cause is Cause.PLANE
+    above = z(0.102)
+    assert breach_asked(LIMITS, asked(tool_m=z(0.1), tool_before_m=above)) is None
+    assert breach_asked(LIMITS, asked(tool_m=z(0.1 - 1e-9), tool_before_m=above)).cause is Cause.PLANE
     assert breach_asked(LIMITS, asked(tool_m=z(0.09), tool_before_m=z(0.09))) is None, "standing beyond it"
-    assert breach_asked(LIMITS, asked(tool_m=z(0.09), tool_before_m=z(0.08))) is None, "coming back"
+    assert breach_asked(LIMITS, asked(tool_m=z(0.09), tool_before_m=z(0.088))) is None, "coming back"
     assert breach_felt(LIMITS, felt(tool_m=z(0.0600001))) is None
     assert breach_felt(LIMITS, felt(tool_m=z(0.0599999))).cause is Cause.PLANE_VIOLATION
 

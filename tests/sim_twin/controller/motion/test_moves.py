@@ -1,5 +1,7 @@
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from sim_twin.controller.motion.core import MotionConflictError
 from sim_twin.controller.motion.force import ForceKind, ForceTask, task_axes
@@ -346,3 +348,63 @@ def test_a_move_without_speed_is_refused_and_what_moved_before_goes_on(a, v):
     with pytest.raises(ValueError, match="above 0"):
         bench.run(bench.motions.moves.movej(HOME, a, v))
     assert bench.motions.core.tail is tail
+
+
+# A slider's share before, the one it falls to, and the one it is raised to.
+SLIDERS = st.tuples(*(st.sampled_from((0.0, 0.01, 0.05, 0.3, 1.0)),) * 3)
+
+
+@settings(deadline=None, max_examples=25, derandomize=True)
+@given(
+    sliders=SLIDERS,
+    n_falling=st.integers(0, 130),
+    v=st.floats(0.3, 3.0),
+    a=st.floats(2.0, 20.0),
+    kind=st.integers(0, 2),
+)
+def test_what_is_taken_over_goes_no_further_than_its_speed_takes_it(sliders, n_falling, v, a, kind):
+    bench = make_bench()
+    motions, pace = bench.motions, bench.motions.core.pace
+    pace.set_slider(sliders[0])
+    gently = 0.5  # slower than the pace falls: the speed is what it was when the pace is low already
+    before = (
+        lambda: motions.speeds.speedj(X * v, 8.0, 0.4),
+        lambda: motions.speeds.speedj(X * v, 8.0, 0.4),
+        lambda: motions.speeds.speedl((0, v / 4, 0, 0, 0, 0), 2.0, 0.4),
+    )[kind]
+    bench.run(before())
+    pace.set_slider(sliders[1])
+    pace.is_paused = kind == 1
+    bench.run(motions.speeds.speedj(motions.setpoint.qd_target, gently, max(0.002, n_falling * 0.002)))
+    pace.is_paused = False
+    start, speed = motions.setpoint.q_target, motions.setpoint.qd_target
+    taken = len(bench.q)
+
+    def raise_again(n):
+        if n == 60:
+            pace.set_slider(max(0.05, sliders[2]))
+
+    bench.run(motions.moves.movej(start, a, 1.0), at=raise_again)
+    fastest = np.abs(speed).max()
+    ways = np.abs(np.array(bench.q[taken:]) - start).max(axis=0)
+    assert ways.max() <= fastest**2 / (2 * a) * 1.01 + fastest * 0.004
+    assert np.abs(bench.qd[taken:]).max() <= fastest * 1.01 + 0.02, "a slider makes nothing faster than it was"
+    assert motions.setpoint.q_target == pytest.approx(start, abs=1e-9)
+
+
+@pytest.mark.parametrize("low", [0.02, 0.1, 0.5])
+def test_a_blend_under_a_lowered_slider_goes_the_same_way_slower(low):
+    ways = []
+    for share in (1.0, low):
+        bench = make_bench()
+        moves, pace = bench.motions.moves, bench.motions.core.pace
+        pace.set_slider(share)
+        bench.idle(200)
+        bench.q.clear(), bench.tool.clear()
+        bench.run(
+            moves.movel(shifted(bench, dy=0.15), 1.2, 0.25, r=0.03), moves.movel(shifted(bench, 0.1, 0.15), 1.2, 0.25)
+        )
+        ways.append(bench.path())
+    off = [np.linalg.norm(ways[1] - p, axis=1).min() for p in ways[0][::10]]
+    assert max(off) < 1e-3
+    assert len(ways[1]) == pytest.approx(len(ways[0]) / low, rel=0.05)
