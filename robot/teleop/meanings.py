@@ -22,6 +22,7 @@ MEANINGS = {
     "flange_speed": "the flange is as fast as the profile lets it",
     "elbow_speed": "the elbow is as fast as the profile lets it",
     "tool_cone": "the tool may tilt no further",
+    "stop_ahead": "the arm could not stop clear of something for much longer, braking",
     "clearance": "the arm comes near something, slower",
     "singularity": "the arm nears a place where it loses a direction, slower",
     "no_intent": "nothing came in time, at rest",

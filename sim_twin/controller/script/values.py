@@ -47,6 +47,9 @@ class ScriptStruct:
     def __eq__(self, other: object) -> bool:
         return isinstance(other, ScriptStruct) and self.members == other.members
 
+    def __repr__(self) -> str:
+        return f"ScriptStruct({self.members!r})"
+
     __hash__ = None  # pyright: ignore[reportAssignmentType] - it changes
 
 
