@@ -6,9 +6,9 @@ from threading import Event as Gate
 
 import pytest
 
+from sim_twin.controller import program
 from sim_twin.controller.compiling import InlineCompiler, ThreadCompiler
 from sim_twin.controller.faults import Faults
-from sim_twin.controller.program import N_SECONDARY
 from sim_twin.controller.states import Event, PowerTimes, RuntimeState, SafetyMode
 from sim_twin.controller.wire import Outcome
 from sim_twin.controller.wire.script_framer import N_PROGRAM_CHARS
@@ -54,11 +54,12 @@ def test_secs_take_a_slice_each_in_their_order_whatever_they_spend():
     assert state_of(robot) is PLAYING
 
 
-def test_more_secs_than_may_wait_are_turned_away_and_say_so():
+def test_more_secs_than_may_wait_are_turned_away_and_say_so(monkeypatch):
+    monkeypatch.setattr(program, "N_SECONDARY", 20)
     robot = started(FOREVER)
-    starts = [robot.programs.submit(SEC) for _ in range(N_SECONDARY + 1)]
+    starts = [robot.programs.submit(SEC) for _ in range(21)]
     run(robot, 1)
-    assert [start.has_begun for start in starts] == [True] * N_SECONDARY + [False]
+    assert [start.has_begun for start in starts] == [True] * 20 + [False]
     assert any("secondary programs wait" in line for line in lines(robot))
 
 
