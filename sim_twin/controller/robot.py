@@ -108,6 +108,7 @@ class VirtualRobot:
         if not machine.modes.may_move:
             drive.stiffen()
         machine.world.digital_out = self.box.drive(machine.io.digital_out)
+        drive.is_force_borne = bool(machine.modes.safety_status_bits & _PROTECTIVE_BIT)
         breach = drive.tick()
         if self.disturb is not None:
             drive.measured = self.disturb(drive.measured)
@@ -159,7 +160,7 @@ class VirtualRobot:
     def _stop_for(self, breach: Breach) -> None:
         cause = breach.cause
         bits = self.machine.modes.safety_status_bits
-        is_pressing_still = cause is Cause.FORCE_VIOLATION and bits & _PROTECTIVE_BIT
+        is_pressing_still = cause is Cause.FORCE_VIOLATION and self.machine.drive.is_force_borne
         if is_pressing_still or bits & (_VIOLATION_BIT if cause.is_violation else _PROTECTIVE_BIT):
             # What presses goes on pressing while the arm comes to rest: one blow is one stop.
             return

@@ -177,3 +177,22 @@ def test_a_move_beside_torques_is_a_conflict(main, thread):
     run(robot, 20)
     assert state_of(robot) is RuntimeState.STOPPED
     assert any("another thread" in line for line in lines(robot))
+
+
+def test_an_arm_that_presses_on_while_it_is_stopped_keeps_its_power_and_moves_once_it_is_released():
+    robot = started(FOREVER)
+    robot.programs.handle(Event.PROTECTIVE_STOP)
+    drive = robot.machine.drive
+    limits = drive.limits
+    drive.limits = msgspec.structs.replace(limits, tool_force_n=-100.0)  # whatever the tool feels is beyond it
+    run(robot, 20)
+    assert robot.machine.modes.safety is SafetyMode.PROTECTIVE_STOP
+    drive.limits = limits
+    run(robot, 2600)
+    assert robot.panel.unlock_protective_stop() is Outcome.DONE
+    robot.panel.stop()
+    run(robot, 20)
+    before = drive.measured.q_rad[0]
+    robot.submit_script("def f():\n q = get_actual_joint_positions()\n q[0] = q[0] + 0.2\n movej(q)\nend\n")
+    run(robot, 800)
+    assert drive.measured.q_rad[0] == pytest.approx(before + 0.2, abs=1e-3)
