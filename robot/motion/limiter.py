@@ -34,9 +34,7 @@ class Limiter:
         self._share = 1.0
         self.seed(self._rest)
 
-    def seed(
-        self, at: list[float], speed: list[float] | None = None, acceleration: list[float] | None = None
-    ) -> None:
+    def seed(self, at: list[float], speed: list[float] | None = None, acceleration: list[float] | None = None) -> None:
         """Start at a place, at rest or on the move, aiming at that place; everything before is forgotten.
 
         Args:
@@ -63,6 +61,16 @@ class Limiter:
         rate = [(c - 2.0 * b + a) / (dt * dt) for a, b, c in zip(earlier, before, at, strict=True)]
         rate = [min(max(a, -most), most) for a, most in zip(rate, self._acceleration, strict=True)]
         self.seed(at, [(c - b) / dt + 0.5 * dt * a for b, c, a in zip(before, at, rate, strict=True)], rate)
+
+    @property
+    def share(self) -> float:
+        """Which share of every axis's greatest speed is used."""
+        return self._share
+
+    @property
+    def greatest(self) -> list[float]:
+        """The greatest speeds.  () -> (n,)"""
+        return self._speed
 
     @property
     def at(self) -> list[float]:
