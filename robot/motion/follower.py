@@ -10,7 +10,6 @@ from robot.kinematics import Kinematics, UnreachableError
 from robot.messages import Vec3, Vec6
 from robot.motion.holding import share_of_step, slid
 from robot.motion.limiter import AxisLimits, Limiter
-from robot.motion.straighten import Straightening
 
 __all__ = ["Follower"]
 
@@ -19,15 +18,13 @@ SPEED_SHARE = 0.95
 RATE_SHARE = 0.9
 """Likewise of joints' acceleration and jerk: what is held back for another reason goes on without a jolt."""
 ALIGN_RAD = 0.01
-"""A tool tilted or turned by less than this points down as far as motion cares; the next ticks set it right."""
+"""A tool tilted or turned by less than this points down as far as motion cares; the next tick sets it right."""
 SWIFT_TICK_S = 0.005
 """In shorter ticks than this, a real arm's and not the twin's, the way to a new target is found one tick after it was
 set: the tick in which an intent begins has enough to do."""
 STILL_RAD_S = 1e-3
 ALIGN_STEP_RAD = 0.35
 """Greatest change of any joint's target in one step while the tool is brought upright."""
-N_AHEAD = 5
-"""Ticks that joints need to brake gently: so far ahead a part's speed is looked at."""
 N_SPANS = 4
 """So many chords of the way to a joint target tell how fast the parts would go along it."""
 PATH_SHARE, LEAST_SHARE = 0.96, 0.01
@@ -60,7 +57,6 @@ class Follower:
         self._kinematics = Kinematics(arm, is_swift=True)
         self._home_yaw_rad = arm.tool_yaw_rad
         self._tick_s = tick_s
-        self._straight = Straightening(tick_s=tick_s)
         self._tool = Limiter(
             AxisLimits(
                 speed=(*(motion.speed_m_s,) * 3, TURN_RAD_S),
@@ -80,24 +76,19 @@ class Follower:
         self._joint_step_rad = tuple(SPEED_SHARE * j.speed_rad_s * tick_s for j in joints)
         self.seed(arm.home_rad)
 
-    def seed(self, q_rad: Vec6, *, is_pushed: bool = False) -> None:
-        """Rest at these joints; everything before is forgotten.
-
-        A tool that something pushes sets itself upright at once: what it is tilted by would grow with every push.
-        """
+    def seed(self, q_rad: Vec6) -> None:
+        """Rest at these joints; everything before is forgotten."""
         self.q_rad = self.q_before_rad = self._q_earlier_rad = q_rad
         self.trouble: str | None = None
         self.held: tuple[str, float] | None = None
         self._is_fenced = False
-        self._pace = self._pace_before = 0.0
         self._points = self._kinematics.chain.points(q_rad)
         self.target_m = self._kinematics.tcp(q_rad)
         self.yaw_rad = self._home_yaw_rad
-        self._is_upright = self._is_solved = self._is_pushed = False
+        self._is_upright = self._is_solved = False
         self._to_come: list[float] | None = None
         self._joints.seed(list(q_rad))
         self._take_up_tool()
-        self._is_pushed = is_pushed
 
     def tcp(self, q_rad: Vec6) -> Vec3:
         """Return the tool centre point for joint angles, base frame, metres."""
@@ -192,7 +183,7 @@ class Follower:
     def step(self) -> Vec6:
         """Advance by one tick and return the joints to command."""
         self.trouble = self.held = None
-        q = self._step_tool() if self._is_upright else self._step_joints()
+        q = self._step_tool() if self._is_upright else _vec6(self._joints.step())
         if q != self.q_rad:
             q = self._hold_back(q)
         if self._tool.is_failed or self._joints.is_failed:
@@ -205,30 +196,19 @@ class Follower:
             self._take_target(self._to_come)
         before = self._tool.at
         now = self._slide(before, self._tool.step())
-        if now == before and self._is_solved and self._straight.is_done:
+        if now == before and self._is_solved:
             return self.q_rad  # at rest: solving again would stir the last digits
+        self._is_solved = True
         x, y, z, yaw = now
         ahead = _between(self.q_before_rad, self.q_rad, 2.0)
         try:
-            if not self._is_solved and not self._is_pushed:
-                self._straight.begin(self.q_rad, self._kinematics.solve(_vec3(before), self.q_rad, yaw_rad=before[3]))
-            self._is_solved = True
-            q = self._straight.add_to(self._kinematics.solve((x, y, z), ahead, yaw_rad=yaw))
+            q = self._kinematics.solve((x, y, z), ahead, yaw_rad=yaw)
         except UnreachableError:
             self._take_up_joints()
             self.brake()
             self.trouble = "unreachable"
             return _vec6(self._joints.step())
         return q
-
-    def _step_joints(self) -> Vec6:
-        """Slow joints down ahead of a part's greatest speed: on the way to a new target they leave the straight way."""
-        ahead = self._pace + N_AHEAD * max(0.0, self._pace - self._pace_before)
-        if ahead > PATH_SHARE:
-            joints = self._joints
-            fastest = max([abs(v) / most for v, most in zip(joints.speed, joints.greatest, strict=True)])
-            joints.slow_to(min(joints.share, max(LEAST_SHARE, fastest * PATH_SHARE / ahead)))
-        return _vec6(self._joints.step())
 
     def _take_target(self, target: list[float]) -> None:
         if self._is_due:
@@ -255,8 +235,6 @@ class Follower:
         chain, now = self._kinematics.chain, self.q_rad
         points = chain.points(q)
         share, name = share_of_step(now, self.q_before_rad, q, self._points, points, self._envelope)
-        sizes = zip(self._points[0], points[0], self._envelope.part_step_m, strict=True)
-        self._pace_before, self._pace = self._pace, max([math.dist(a, b) / most for a, b, most in sizes])
         if self._is_upright:  # joint limiters keep to their own greatest speed
             excess = max([abs(a - b) / most for a, b, most in zip(q, now, self._joint_step_rad, strict=True)])
             if excess > 1.0 and 1.0 / excess <= share:
@@ -291,8 +269,7 @@ class Follower:
         yaw = unwound(turn_about_vertical(quat), self._home_yaw_rad)
         if abs(yaw - self._home_yaw_rad) < ALIGN_RAD:
             yaw = self._home_yaw_rad
-        self._is_upright, self._to_come, self._is_pushed = True, None, False
-        self._straight.end()
+        self._is_upright, self._to_come = True, None
         self.q_before_rad = self._q_earlier_rad = self.q_rad
         self.target_m, self.yaw_rad = self._kinematics.tcp(self.q_rad), yaw
         self._tool.seed([*self.target_m, yaw])
@@ -319,10 +296,6 @@ class Follower:
 
 def _between(a: Vec6, b: Vec6, share: float) -> Vec6:
     return _vec6([u + share * (v - u) for u, v in zip(a, b, strict=True)])
-
-
-def _vec3(x: list[float]) -> Vec3:
-    return x[0], x[1], x[2]
 
 
 def _vec6(x: list[float]) -> Vec6:

@@ -63,16 +63,6 @@ class Limiter:
         self.seed(at, [(c - b) / dt + 0.5 * dt * a for b, c, a in zip(before, at, rate, strict=True)], rate)
 
     @property
-    def share(self) -> float:
-        """Which share of every axis's greatest speed is used."""
-        return self._share
-
-    @property
-    def greatest(self) -> list[float]:
-        """The greatest speeds.  () -> (n,)"""
-        return self._speed
-
-    @property
     def at(self) -> list[float]:
         """Where the axes are set to.  () -> (n,)"""
         return self._now.current_position

@@ -179,7 +179,7 @@ class Mover:
         share = share_of_giving_way(follower.q_rad, follower.q_before_rad, back, state.q_rad, self._envelope)
         if share < 1.0:
             back = _along(follower.q_rad, change, share)
-        follower.seed(back, is_pushed=True)
+        follower.seed(back)
         self._trail.seed(back)
         follower.aim(fence(target_m, state.tcp_position_m, self._limits).position_m, yaw)  # nearer to where it was
         return back

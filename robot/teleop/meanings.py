@@ -23,6 +23,7 @@ MEANINGS = {
     "elbow_speed": "the elbow is as fast as the profile lets it",
     "tool_cone": "the tool may tilt no further",
     "clearance": "the arm comes near something, slower",
+    "stop_ahead": "a stop would come too near something, braking",
     "singularity": "the arm nears a place where it loses a direction, slower",
     "no_intent": "nothing came in time, at rest",
     "object_lost": "what the hand held slipped away",

@@ -199,17 +199,3 @@ def test_joints_go_to_others_nearly_as_fast_as_the_parts_may_and_no_faster_witho
     assert not is_held
     assert fastest <= 1.0
     assert name == "unattended" or fastest > 0.75
-
-
-@pytest.mark.parametrize("joint", [3, 4, 5])
-def test_a_tool_that_is_tilted_a_little_is_set_upright_without_a_jolt(joint):
-    follower = Follower(ARM, envelope=open_envelope(DT), tick_s=DT)
-    start = tuple(q + (0.008 if i == joint else 0.0) for i, q in enumerate(Q_START))
-    follower.seed(start)
-    x, y, z = follower.target_m
-    assert follower.is_upright
-    follower.aim((x, y, z + 0.01), follower.yaw_rad)
-    path = np.array([start, start, start, *run(follower, 60)])
-    assert np.abs(np.diff(path[:, joint], 2)).max() / DT**2 < 25.0
-    assert np.abs(np.diff(path[:, joint], 3)).max() / DT**3 < 800.0
-    assert np.allclose(forward_kinematics(ARM, path[-1])[:3, :3], tool_down(ARM.tool_yaw_rad), atol=1e-4)

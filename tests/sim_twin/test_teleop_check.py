@@ -43,8 +43,6 @@ SPEEDS = ("command_tcp_speed", "command_flange_speed", "command_elbow_speed", "e
 MENDED = (
     pytest.param(2400, SPEEDS, id="writes that give way to nothing"),
     pytest.param(721, SPEEDS, id="joints that outran the elbow"),
-    pytest.param(1997, ("command_jerk", *SPEEDS), id="joints held back at the tool's speed"),
-    pytest.param(2717, ("tcp_speed", *SPEEDS), id="a search for the tool's speed", marks=pytest.mark.slow),
     pytest.param(3036, SPEEDS, id="a search for the base column", marks=pytest.mark.slow),
 )
 """Streams of the attended battery, seed 0, and limits that were broken there."""
