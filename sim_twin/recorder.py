@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from sim_twin.names import on_table
 from sim_twin.plant import TwinWorld
+from sim_twin.points import elbow_offset
 
 __all__ = ["Course", "PartKind", "Recorder", "Touch", "part_kinds"]
 
@@ -135,7 +136,9 @@ class Recorder:
         left, right = world.finger_addresses
         self._finger_at = slice(left, right + 1)
         self._tcp, self._flange = (data.site_xpos[model.site(s).id] for s in ("tcp", "flange"))
-        self._elbow = data.xpos[model.body("link_3").id]
+        forearm = model.body("link_3").id
+        self._forearm, self._forearm_frame = data.xpos[forearm], data.xmat[forearm].reshape(3, 3)
+        self._elbow_offset = elbow_offset(model)
         self._tool_frame = data.site_xmat[model.site("tcp").id].reshape(3, 3)
         self._tool_twist, self._elbow_twist = (data.cvel[model.body(b).id] for b in ("tool", "link_3"))
         self._com = data.subtree_com[int(model.body_rootid[model.body("tool").id])]
@@ -181,7 +184,8 @@ class Recorder:
         self._q[k], self._qd[k] = data.qpos[:N_JOINTS], data.qvel[:N_JOINTS]
         self._fingers[k] = data.qpos[self._finger_at]
         self._grip[k] = data.actuator_force[self._world.grip_control]
-        self._points[k, 0], self._points[k, 1], self._points[k, 2] = self._tcp, self._flange, self._elbow
+        elbow = self._forearm + self._forearm_frame @ self._elbow_offset
+        self._points[k, 0], self._points[k, 1], self._points[k, 2] = self._tcp, self._flange, elbow
         self._approach[k] = self._tool_frame[:, 2]
         self._twists[k, 0], self._twists[k, 1], self._centre[k] = self._tool_twist, self._elbow_twist, self._com
         self._stopping[k] = self._world.stop_speed_rad_s is not None

@@ -1,6 +1,7 @@
 """The set-point that follows a target: straight lines of the tool pointing down, or joints, jerk-limited either way."""
 
 import math
+from itertools import pairwise
 
 from config.arm import ArmConfig
 from robot.envelope import Envelope
@@ -14,6 +15,8 @@ __all__ = ["Follower"]
 
 SPEED_SHARE = 0.95
 """Share of a joint's greatest speed that motion uses, so that the gate's limit is never met by rounding."""
+RATE_SHARE = 0.9
+"""Likewise of joints' acceleration and jerk: what is held back for another reason goes on without a jolt."""
 ALIGN_RAD = 0.01
 """A tool tilted or turned by less than this points down as far as motion cares; the next tick sets it right."""
 SWIFT_TICK_S = 0.005
@@ -22,6 +25,10 @@ set: the tick in which an intent begins has enough to do."""
 STILL_RAD_S = 1e-3
 ALIGN_STEP_RAD = 0.35
 """Greatest change of any joint's target in one step while the tool is brought upright."""
+N_SPANS = 4
+"""So many chords of the way to a joint target tell how fast the parts would go along it."""
+PATH_SHARE, LEAST_SHARE = 0.96, 0.01
+"""Of the parts' greatest speeds: chords are a little shorter than the way, and joints swing in from others."""
 TURN_RAD_S, TURN_RAD_S2, TURN_RAD_S3 = 2.0, 10.0, 200.0
 """Bounds of the tool's turn about the vertical."""
 
@@ -61,8 +68,8 @@ class Follower:
         self._joints = Limiter(
             AxisLimits(
                 speed=tuple(SPEED_SHARE * j.speed_rad_s for j in joints),
-                acceleration=tuple(j.acceleration_rad_s2 for j in joints),
-                jerk=tuple(j.jerk_rad_s3 for j in joints),
+                acceleration=tuple(RATE_SHARE * j.acceleration_rad_s2 for j in joints),
+                jerk=tuple(RATE_SHARE * j.jerk_rad_s3 for j in joints),
             ),
             tick_s=tick_s,
         )
@@ -71,7 +78,7 @@ class Follower:
 
     def seed(self, q_rad: Vec6) -> None:
         """Rest at these joints; everything before is forgotten."""
-        self.q_rad = self.q_before_rad = q_rad
+        self.q_rad = self.q_before_rad = self._q_earlier_rad = q_rad
         self.trouble: str | None = None
         self.held: tuple[str, float] | None = None
         self._is_fenced = False
@@ -123,8 +130,23 @@ class Follower:
         """Go to joint angles."""
         if self._is_upright:
             self._take_up_joints()
+        self._joints.slow_to(self._share_of_speed(q_rad))
         self._joints.aim(list(q_rad))
         self.target_m = self._kinematics.tcp(q_rad)
+
+    def _share_of_speed(self, q_rad: Vec6) -> float:
+        """Return the share of their greatest speeds at which joints may go straight to others, by the parts' speeds."""
+        now, chain = self.q_rad, self._kinematics.chain
+        turns = max([abs(b - a) / most for a, b, most in zip(now, q_rad, self._joint_step_rad, strict=True)])
+        if turns <= 0.0:
+            return 1.0
+        places = [chain.points(_between(now, q_rad, k / N_SPANS))[0] for k in range(N_SPANS + 1)]
+        fastest = max(
+            math.dist(a, b) / most
+            for before, after in pairwise(places)
+            for a, b, most in zip(before, after, self._envelope.part_step_m, strict=True)
+        )
+        return min(1.0, max(LEAST_SHARE, PATH_SHARE * turns / (N_SPANS * fastest))) if fastest > 0.0 else 1.0
 
     def joints_at(self, place_m: Vec3, yaw_rad: float | None = None, seed_rad: Vec6 | None = None) -> Vec6 | None:
         """Return joints near the present ones that bring the tool to a place; None where none do, or it is tilted.
@@ -166,7 +188,7 @@ class Follower:
             q = self._hold_back(q)
         if self._tool.is_failed or self._joints.is_failed:
             self.trouble = "brake"
-        self.q_before_rad, self.q_rad = self.q_rad, q
+        self._q_earlier_rad, self.q_before_rad, self.q_rad = self.q_before_rad, self.q_rad, q
         return q
 
     def _step_tool(self) -> Vec6:
@@ -225,13 +247,14 @@ class Follower:
         q = _between(now, q, share)
         self._points = chain.points(q)
         if self._is_upright:
-            target, speed = self._tool.target, [v * share for v in self._tool.speed]
+            target, tool = self._tool.target, self._tool
+            speed, rate = [v * share for v in tool.speed], [a * share for a in tool.acceleration]
             yaw = turn_about_vertical(chain.quat(q))
-            self._tool.seed([*self._points[0][0], unwound(yaw, target[3])], speed)
+            self._tool.seed([*self._points[0][0], unwound(yaw, target[3])], speed, rate)
             self._tool.aim(target)
         else:
-            target, speed = self._joints.target, [v * share for v in self._joints.speed]
-            self._joints.seed(list(q), speed)
+            target = self._joints.target
+            self._joints.go_on(list(self.q_before_rad), list(now), list(q))
             self._joints.aim(target)
         return q
 
@@ -247,7 +270,7 @@ class Follower:
         if abs(yaw - self._home_yaw_rad) < ALIGN_RAD:
             yaw = self._home_yaw_rad
         self._is_upright, self._to_come = True, None
-        self.q_before_rad = self.q_rad
+        self.q_before_rad = self._q_earlier_rad = self.q_rad
         self.target_m, self.yaw_rad = self._kinematics.tcp(self.q_rad), yaw
         self._tool.seed([*self.target_m, yaw])
         self._is_solved = False
@@ -255,8 +278,8 @@ class Follower:
     def _take_up_joints(self) -> None:
         """Go on by the joints, from where they are and as fast as they go."""
         self._is_upright = False
-        speed = [(a - b) / self._tick_s for a, b in zip(self.q_rad, self.q_before_rad, strict=True)]
-        self._joints.seed(list(self.q_rad), speed)
+        self._joints.slow_to(1.0)
+        self._joints.go_on(list(self._q_earlier_rad), list(self.q_before_rad), list(self.q_rad))
 
     def _align(self, target_m: Vec3, yaw_rad: float) -> bool:
         """Bring the tool upright on the way to a place, by a bounded change of the joints."""

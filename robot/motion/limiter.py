@@ -31,17 +31,36 @@ class Limiter:
         self._tick_s = tick_s
         self._speed, self._acceleration, self._jerk = list(limits.speed), list(limits.acceleration), list(limits.jerk)
         self._rest = [0.0] * self._n
+        self._share = 1.0
         self.seed(self._rest)
 
-    def seed(self, at: list[float], speed: list[float] | None = None) -> None:
-        """Start at a place, at rest or at a speed, aiming at that place; everything before is forgotten.  (n,), (n,)"""
+    def seed(self, at: list[float], speed: list[float] | None = None, acceleration: list[float] | None = None) -> None:
+        """Start at a place, at rest or on the move, aiming at that place; everything before is forgotten.
+
+        Args:
+            at: (n,)
+            speed: (n,), at rest where absent.
+            acceleration: (n,), none where absent; what is beyond the limits is left out.
+        """
         self._otg = ruckig.Ruckig(self._n, self._tick_s)
         self._now = self._bounded()
         self._next = ruckig.OutputParameter(self._n)
-        self._put(at, speed or self._rest, self._rest)
+        rate = acceleration or self._rest
+        held = [min(max(a, -most), most) for a, most in zip(rate, self._acceleration, strict=True)]
+        self._put(at, speed or self._rest, held)
         self._now.target_velocity = self._now.target_acceleration = self._rest
         self._now.target_position = self._target = at
         self._is_resting = self.is_failed = False
+
+    def go_on(self, earlier: list[float], before: list[float], at: list[float]) -> None:
+        """Start on the move that three places a tick apart tell of, the newest last.  (n,), (n,), (n,)
+
+        Their differences are means over ticks; the speed that there is at the end of the last is half a tick on.
+        """
+        dt = self._tick_s
+        rate = [(c - 2.0 * b + a) / (dt * dt) for a, b, c in zip(earlier, before, at, strict=True)]
+        rate = [min(max(a, -most), most) for a, most in zip(rate, self._acceleration, strict=True)]
+        self.seed(at, [(c - b) / dt + 0.5 * dt * a for b, c, a in zip(before, at, rate, strict=True)], rate)
 
     @property
     def at(self) -> list[float]:
@@ -54,9 +73,21 @@ class Limiter:
         return self._now.current_velocity
 
     @property
+    def acceleration(self) -> list[float]:
+        """How fast that changes.  () -> (n,)"""
+        return self._now.current_acceleration
+
+    @property
     def target(self) -> list[float]:
         """Where they will rest.  () -> (n,)"""
         return self._target
+
+    def slow_to(self, share: float) -> None:
+        """Go no faster than a share of every axis's greatest speed from now on; what is faster brakes."""
+        if share != self._share:
+            self._share = share
+            self._now.max_velocity = [share * most for most in self._speed]
+            self._is_resting = False
 
     def aim(self, target: list[float]) -> None:
         """Set where to rest.  (n,)"""
@@ -118,7 +149,8 @@ class Limiter:
     def _bounded(self) -> ruckig.InputParameter:
         bounded = ruckig.InputParameter(self._n)
         bounded.synchronization = ruckig.Synchronization.Phase
-        bounded.max_velocity, bounded.max_acceleration, bounded.max_jerk = self._speed, self._acceleration, self._jerk
+        bounded.max_velocity = [self._share * most for most in self._speed]
+        bounded.max_acceleration, bounded.max_jerk = self._acceleration, self._jerk
         return bounded
 
     def _brake_by_hand(self) -> list[float]:

@@ -8,6 +8,7 @@ from robot.messages import Vec3, Vec6
 from robot.safety.checks import Reason, Refusal
 
 __all__ = [
+    "Points",
     "check_cone",
     "check_fences",
     "check_joint_acceleration",
@@ -47,18 +48,25 @@ def check_soft_margin(q_rad: Vec6, last_rad: Vec6, envelope: Envelope) -> Refusa
 
 
 def check_joint_acceleration(
-    q_rad: Vec6, last_rad: Vec6, before_rad: Vec6, measured_rad: Vec6, envelope: Envelope
+    q_rad: Vec6, last_rad: Vec6, before_rad: Vec6, measured_rad: Vec6 | None, envelope: Envelope
 ) -> Refusal | None:
     """Refuse a joint whose command changes its speed by more than its acceleration allows in one tick.
 
-    Losing speed without turning round, and giving way to where the arm is measured, may be as hard as they will: a
-    stop brakes so, and a command that something pushed back.
+    Losing speed without turning round, and giving way to where the arm is measured while something holds it, may be as
+    hard as they will: a stop brakes so, and a command that something pushed back.
+
+    Args:
+        q_rad: the command.
+        last_rad: the command before.
+        before_rad: the one before that.
+        measured_rad: where the arm is, if something pushes it; None where nothing does.
+        envelope: how much their speed may change.
     """
     for i, end in enumerate(envelope.joints):
         last, step, most = last_rad[i] - before_rad[i], q_rad[i] - last_rad[i], end.braking_rad
         if abs(step - last) <= most:
             continue
-        back = measured_rad[i] - last_rad[i]
+        back = 0.0 if measured_rad is None else measured_rad[i] - last_rad[i]
         over = max(step - max(0.0, last, back), min(0.0, last, back) - step)
         if not over <= most:
             detail = f"joint {i + 1}: expected a step within {most:g} rad of the last, {last:g}, came {step:g}"
@@ -66,24 +74,27 @@ def check_joint_acceleration(
     return None
 
 
-def check_part_speeds(now: Points, last: Points, measured: Callable[[], Points], envelope: Envelope) -> Refusal | None:
+def check_part_speeds(
+    now: Points, last: Points, measured: Callable[[], Points] | None, envelope: Envelope
+) -> Refusal | None:
     """Refuse a tool centre point, flange or elbow that would go further in one tick than its speed allows.
 
-    One that comes nearer to where it is measured gives way to a push and may do so at once.
+    One that comes nearer to where it is measured, while something holds it, gives way and may do so at once.
 
     Args:
         now: the parts for the command.
         last: the parts for the command before.
-        measured: where they are; asked only where a part is too fast.
+        measured: where they are, if something pushes the arm; asked only where a part is too fast.
         envelope: how far they may go.
     """
     for i, most in enumerate(envelope.part_step_m):
         (x, y, z), (u, v, w) = now[i], last[i]
         dx, dy, dz = x - u, y - v, z - w
         if not dx * dx + dy * dy + dz * dz <= most * most:
-            is_at = measured()[i]
-            if math.dist(now[i], is_at) <= math.dist(last[i], is_at):
-                continue
+            if measured is not None:
+                is_at = measured()[i]
+                if math.dist(now[i], is_at) <= math.dist(last[i], is_at):
+                    continue
             way = math.dist(now[i], last[i])
             detail = f"{PART_NAMES[i]}: expected at most {most:g} m a tick, came {way:g}"
             return Refusal(Reason.PART_SPEED, detail, way - most)

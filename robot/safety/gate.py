@@ -24,6 +24,7 @@ from robot.safety.checks import (
     check_tracking,
 )
 from robot.safety.checks_profile import (
+    Points,
     check_cone,
     check_fences,
     check_joint_acceleration,
@@ -148,27 +149,36 @@ class Gate:
             refusal = (
                 check_joint_range(q, limits)
                 or check_joint_speed(q, self._q_rad, limits)
-                or self._check_parts(q, state.q_rad)
+                or self._check_parts(q, state.q_rad if force_n > limits.contact_n else None)
                 or check_intent_age(self._intent_ns, now_ns, limits)
                 or (None if self._stops is None else self._stops.check(q, self._q_rad, state))
             )
         return refusal or check_tracking(q, state.q_rad, limits)
 
-    def _check_parts(self, q_rad: Vec6, measured_rad: Vec6) -> Refusal | None:
-        """Look at where joints lead that are in range and no faster than they may be, and hold the limits profile."""
+    def _check_parts(self, q_rad: Vec6, pushed_rad: Vec6 | None) -> Refusal | None:
+        """Look at where joints lead that are in range and no faster than they may be, and hold the limits profile.
+
+        Args:
+            q_rad: the command.
+            pushed_rad: where the arm is measured, if the force on its tool says that something holds it: only then a
+                command may give way faster than it may go.
+        """
         envelope, last_rad = self._envelope, self._q_rad
         points, down = self._chain.points(q_rad)
         tcp = points[0]
         refusal = (
             check_tool(tcp, self._chain.lowest_m(tcp, down), self._limits)
             or check_soft_margin(q_rad, last_rad, envelope)
-            or check_joint_acceleration(q_rad, last_rad, self._q_before_rad, measured_rad, envelope)
+            or check_joint_acceleration(q_rad, last_rad, self._q_before_rad, pushed_rad, envelope)
             or check_fences(points, envelope)
             or check_cone(down, envelope)
-            or check_part_speeds(points, self._points, lambda: self._chain.points(measured_rad)[0], envelope)
+            or check_part_speeds(points, self._points, self._parts_at(pushed_rad), envelope)
         )
         self._points = points
         return refusal
+
+    def _parts_at(self, q_rad: Vec6 | None) -> Callable[[], Points] | None:
+        return None if q_rad is None else lambda: self._chain.points(q_rad)[0]
 
     def _refuse(self, refusal: Refusal, *, stamp_ns: int) -> Verdict:
         is_new = self._latched is None

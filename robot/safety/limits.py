@@ -30,6 +30,8 @@ class GateLimits(msgspec.Struct, frozen=True, kw_only=True):
     tip_min_m: float
     """Lowest that a fingertip may be commanded, base frame."""
     tracking_error_rad: float
+    contact_n: float
+    """A tool with no more than this on it is free: its commands have nothing to give way to."""
     force_max_n: float
     """Greatest steady force on the tool."""
     impact_max_n: float
@@ -69,6 +71,7 @@ class GateLimits(msgspec.Struct, frozen=True, kw_only=True):
             workspace_m=((lo[0] - t, lo[1] - t, lo[2] - FLOOR_BOW_M), (hi[0] + t, hi[1] + t, hi[2] + t)),
             tip_min_m=table_m + motion.table_clearance_m,
             tracking_error_rad=motion.tracking_error_rad,
+            contact_n=motion.contact_force_n,
             force_max_n=motion.force_limit_n,
             impact_max_n=motion.impact_limit_n,
             opening_m=(0.0, min(tool.stroke_m, spec.grip_stroke_m)),

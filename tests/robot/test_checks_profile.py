@@ -66,6 +66,7 @@ def test_braking_and_giving_way_pass_however_hard_but_turning_round_does_not(i, 
     assert check_joint_acceleration(at, rest, before, at, tight) is None
     turned = with_joint(rest, i, -sign * 1.001 * most)
     assert reason(check_joint_acceleration(turned, rest, before, rest, tight)) is Reason.JOINT_ACCELERATION
+    assert reason(check_joint_acceleration(at, rest, rest, None, tight)) is Reason.JOINT_ACCELERATION  # nothing pushes
     past = with_joint(rest, i, -sign * (0.02 + 1.001 * most))
     assert reason(check_joint_acceleration(past, rest, before, at, tight)) is Reason.JOINT_ACCELERATION
 
@@ -134,6 +135,10 @@ def test_a_part_at_its_speed_passes_and_the_next_float_does_not(part, axis):
     beyond = at(math.nextafter(most, UP))
     assert reason(check_part_speeds(beyond, rest, lambda: rest, ENVELOPE)) is Reason.PART_SPEED
     assert check_part_speeds(beyond, rest, lambda: beyond, ENVELOPE) is None  # it gives way
+    assert check_part_speeds(at(most), rest, None, ENVELOPE) is None
+    assert (
+        reason(check_part_speeds(beyond, rest, None, ENVELOPE)) is Reason.PART_SPEED
+    )  # there is nothing to give way to
     assert reason(check_part_speeds(at(math.nan), rest, lambda: rest, ENVELOPE)) is Reason.PART_SPEED
 
 

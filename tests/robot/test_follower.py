@@ -4,11 +4,12 @@ import math
 import numpy as np
 import pytest
 
+from config.limited import limited
 from config.loader import load_arm
 from robot.description import forward_kinematics, tool_down
 from robot.kinematics import Kinematics
 from robot.motion.follower import Follower
-from tests.support.profiles import envelope, open_envelope
+from tests.support.profiles import envelope, open_envelope, profile
 
 ARM = load_arm("ur5e")
 DT, FAST_DT = 0.01, 0.002
@@ -181,3 +182,20 @@ def test_seeding_forgets_everything_before(follower):
     for each in (follower, fresh):
         each.aim((0.44, 0.0, 0.2), ARM.tool_yaw_rad)
     assert run(follower, 40) == run(fresh, 40)
+
+
+@pytest.mark.parametrize("name", ["attended", "unattended"])
+def test_joints_go_to_others_nearly_as_fast_as_the_parts_may_and_no_faster_without_being_held_back(name):
+    held = envelope(DT, name)
+    follower = Follower(limited(ARM, profile(name)), envelope=held, tick_s=DT)
+    follower.seed(Q_START)
+    follower.aim_joints((Q_START[0] + 0.5, Q_START[1] + 0.2, Q_START[2] - 0.2, *Q_START[3:]))
+    fastest, is_held = 0.0, False
+    before = follower.points(Q_START)[0]
+    for q in (follower.step() for _ in range(300)):
+        points = follower.points(q)[0]
+        shares = [math.dist(a, b) / m for a, b, m in zip(before, points, held.part_step_m, strict=True)]
+        fastest, is_held, before = max(fastest, *shares), is_held or follower.held is not None, points
+    assert not is_held
+    assert fastest <= 1.0
+    assert name == "unattended" or fastest > 0.75

@@ -289,3 +289,19 @@ def test_each_limit_of_the_profile_latches_the_gate(arm, name, changes, joint, s
     assert (None if verdict is None else verdict.reason) == expected
     assert gate.is_latched == (expected is not None)
     assert len(arm.commands) == (expected is None)
+
+
+@pytest.mark.parametrize(("force_n", "is_sent"), [(15.0, False), (math.nextafter(15.0, 16.0), True)])
+@pytest.mark.parametrize(
+    ("by_rad", "reason"), [((0.02,), Reason.JOINT_ACCELERATION), ((0.002, 0.004, 0.0062), Reason.PART_SPEED)]
+)
+def test_only_a_command_that_something_pushes_may_give_way_faster_than_it_may_go(arm, force_n, is_sent, by_rad, reason):
+    spec = FakeArm(arm=ARM, tick_s=0.01).spec
+    limits = GateLimits.of(ARM, spec, table_m=0.0, tick_s=0.01)
+    made = Gate(arm=arm, limits=limits, envelope=envelope(0.01, "attended"), chain=CHAIN)
+    made.seed(arm_state(START))
+    places = [(START[0] + sum(by_rad[: k + 1]), *START[1:]) for k in range(len(by_rad))]
+    pushed = arm_state(places[-1], force_n=(0.0, 0.0, force_n))
+    verdicts = [made.write(command(q, sequence=k + 1), pushed, now_ns=0) for k, q in enumerate(places)]
+    reasons = [v.reason for v in verdicts if v is not None]
+    assert reasons[:1] == ([] if is_sent else [reason])

@@ -89,3 +89,29 @@ def test_an_axis_about_to_reach_its_greatest_speed_is_not_slowed_by_a_target_fur
             n_reaching += 0.45 < before < 0.5 - 1e-6
             assert limiter.speed[0] >= before - 1e-9
     assert n_reaching > 30
+
+
+def test_one_that_goes_on_from_the_places_it_came_by_makes_no_jolt():
+    limiter = Limiter(LIMITS, tick_s=DT)
+    limiter.aim([0.3, -0.2])
+    path = [limiter.step() for _ in range(12)]
+    again = Limiter(LIMITS, tick_s=DT)
+    again.go_on(*path[-3:])
+    again.aim([0.3, -0.2])
+    path += [again.step() for _ in range(100)]
+    jerk = np.abs(np.diff(path, 3, axis=0)) / DT**3
+    assert (jerk.max(0) <= 1.3 * np.array(LIMITS.jerk)).all()
+    assert path[-1] == pytest.approx([0.3, -0.2], abs=1e-9)
+
+
+def test_slowed_to_a_share_it_brakes_within_its_limits_and_stays_there():
+    limiter = Limiter(LIMITS, tick_s=DT)
+    limiter.aim([10.0, 5.0])
+    path = list(run(limiter, 60))
+    limiter.slow_to(0.25)
+    path = np.array([*path, *run(limiter, 60)])
+    speed = np.abs(np.diff(path, axis=0)) / DT
+    assert (speed[-10:].max(0) <= 0.25 * np.array(LIMITS.speed) * (1 + 1e-6)).all()
+    assert (np.abs(np.diff(path, 3, axis=0)).max(0) / DT**3 <= np.array(LIMITS.jerk) * (1 + 1e-6)).all()
+    limiter.slow_to(1.0)
+    assert np.abs(np.diff(run(limiter, 60), axis=0)).max() / DT > 0.9

@@ -7,6 +7,7 @@ import pytest
 
 from config.limits import ArmPart, KeepOut, Plane, Profile, Touched
 from config.loader import resolve
+from config.posture import part_points
 from sim_twin.allowances import allowances_for
 from sim_twin.monitor import Monitor
 from sim_twin.names import on_table
@@ -366,3 +367,10 @@ def test_a_payload_that_is_not_compensated_makes_the_tool_droop_and_one_that_is_
             heights[by.payload_kg] = plant.arm.read().tcp_position_m[2]
     assert heights[1.0] < heights[0.0] - 2e-4 < heights[0.0] + 2e-4 < heights[-1.0]
     assert heights[-1.0] - heights[1.0] < 0.01
+
+
+def test_the_elbow_is_where_the_files_say_it_is_and_not_beside_the_arm(stage):
+    stage.tick(1)
+    course = stage.recorder.course()
+    expected = part_points(stage.world.arm, course.q_rad[0])[ArmPart.ELBOW]
+    assert course.position_m[1, 2] == pytest.approx(expected, abs=1e-6)

@@ -39,6 +39,23 @@ SOUND = {
 """Limits that the stack holds when they bind, and that streams reach."""
 
 
+SPEEDS = ("command_tcp_speed", "command_flange_speed", "command_elbow_speed", "elbow_speed", "command_acceleration")
+MENDED = (
+    pytest.param(2400, SPEEDS, id="writes that give way to nothing"),
+    pytest.param(721, SPEEDS, id="joints that outran the elbow"),
+    pytest.param(3036, SPEEDS, id="a search for the base column", marks=pytest.mark.slow),
+)
+"""Streams of the attended battery, seed 0, and limits that were broken there."""
+
+
+@pytest.fixture(scope="module")
+def attended():
+    resolved = resolve(rig="twin")
+    profile = resolved.limits.profile("attended")
+    rig = msgspec.structs.replace(resolved.rig, profile="attended")
+    return Setup(resolved=msgspec.structs.replace(resolved, rig=rig), profile=profile, seed=0)
+
+
 @pytest.fixture(scope="module")
 def resolved():
     return resolve(rig="twin")
@@ -233,3 +250,10 @@ def test_each_limit_weakened_alone_by_a_twentieth_is_told(resolved, mutation):
     outcome = try_mutation(attended, mutation, seed=0, n_streams=len(mutation.families))
     assert outcome.is_held, outcome
     assert outcome.is_caught, outcome
+
+
+@pytest.mark.parametrize(("number", "kept"), MENDED)
+def test_a_stream_that_broke_a_limit_keeps_it(attended, number, kept):
+    came, _ = rerun(attended, number)
+    assert [b for b in came.broken if b.limit in kept] == []
+    assert {r.limit for r in came.readings} >= set(kept)
