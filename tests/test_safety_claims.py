@@ -8,7 +8,7 @@ from tests.support.claims import faults_of
 
 ROOT = Path(__file__).parents[1]
 PAGE = (ROOT / "SAFETY.md").read_text(encoding="utf-8")
-TESTS = '''
+TESTS = """
 import pytest
 
 def test_it_stops():
@@ -37,7 +37,7 @@ def test_where_it_can(x):
 
 def helper():
     pass
-'''
+"""
 HEAD = "| claim | shown by | left |\n|---|---|---|\n"
 
 

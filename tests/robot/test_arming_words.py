@@ -1,5 +1,6 @@
 """What arming, leases, codes and limits say when they refuse, whole; and what they are before anybody did anything."""
 
+import math
 import re
 
 import pytest
@@ -133,6 +134,12 @@ def test_a_stop_and_a_disarming_keep_their_reason_and_arming_forgets_it():
     assert made.state.reason == ""
     made.disarm()
     assert (made.state.mode, made.state.reason) == (StationMode.DISARMED, "")
+
+
+def test_a_stop_of_what_is_engaged_latches_with_its_reason():
+    made = in_mode(StationMode.ENGAGED)
+    made.stop("a hand was seen")
+    assert (made.state.mode, made.state.reason, made.n_latches) == (StationMode.LATCHED, "a hand was seen", 1)
 
 
 @pytest.mark.parametrize("mode", [StationMode.ARMED, StationMode.ENGAGED])
@@ -383,7 +390,8 @@ def test_ending_a_tenure_disarms_and_frees_the_lease():
     held.end()
     assert (made.state.mode, made.state.reason) == (StationMode.DISARMED, "")
     assert held.grant is None
-    assert held.take("learner", life_ns=None).number == 2
+    assert held.renewed() == Grant(source="local", profile="attended", lease=2)
+    assert held.take("local", life_ns=None).number == 3
 
 
 def test_limits_say_what_does_not_fit():
@@ -422,6 +430,53 @@ def test_every_limit_is_the_one_that_file_and_arm_give():
     )
 
 
+def test_each_joint_has_its_own_limits_and_ages_are_to_the_nanosecond():
+    low, high = tuple(-1.0 - k for k in range(6)), tuple(0.5 + 0.25 * k for k in range(6))
+    speeds = tuple(0.5 + 0.1 * k for k in range(6))
+    slow = replace(ARM, motion=replace(ARM.motion, state_max_age_s=5.0, intent_max_age_s=5.0))
+    limits = GateLimits.of(
+        slow, replace(SPEC, q_min_rad=low, q_max_rad=high, qd_max_rad_s=speeds), table_m=0.0, tick_s=1.0
+    )
+    plain = GateLimits.of(ARM, SPEC, table_m=0.0, tick_s=1.0)
+    assert limits.q_min_rad == (*low[:2], max(low[2], ARM.joints[2].range_rad[0]), *low[3:])
+    assert limits.q_max_rad == high
+    assert limits.joint_step_rad == pytest.approx(speeds)
+    assert limits.state_max_age_ns == 5 * 10**9
+    shorter_s = 5.0 - ARM.motion.intent_max_age_s
+    assert abs(limits.intent_max_age_ns - plain.intent_max_age_ns - shorter_s * 1e9) <= 1.0
+
+
+@pytest.mark.parametrize("name", ["q_min_rad", "q_max_rad", "qd_max_rad_s"])
+def test_an_arm_of_another_number_of_joints_is_an_error_and_never_cut_short(name):
+    longer = replace(SPEC, **{name: (*getattr(SPEC, name), 0.0)})
+    with pytest.raises(ValueError, match="zip"):
+        GateLimits.of(ARM, longer, table_m=0.0, tick_s=0.01)
+    with pytest.raises(ValueError, match="zip"):
+        check_profile_fits(profile(), longer)
+
+
+@pytest.mark.parametrize("i", range(6))
+def test_a_profile_at_the_arms_limits_and_a_rounding_passes_and_the_next_float_does_not(i):
+    edge = replace(
+        profile().joints[i],
+        range_rad=(SPEC.q_min_rad[i] - 1e-3, SPEC.q_max_rad[i] + 1e-3),
+        speed_rad_s=SPEC.qd_max_rad_s[i] + 1e-3,
+    )
+    (low, high), speed = edge.range_rad, edge.speed_rad_s
+
+    def held(joint):
+        return profile(joints=tuple(joint if k == i else j for k, j in enumerate(profile().joints)))
+
+    check_profile_fits(held(edge), SPEC)
+    for beyond in (
+        replace(edge, range_rad=(math.nextafter(low, -math.inf), high)),
+        replace(edge, range_rad=(low, math.nextafter(high, math.inf))),
+        replace(edge, speed_rad_s=math.nextafter(speed, math.inf)),
+    ):
+        with pytest.raises(RobotConfigError):
+            check_profile_fits(held(beyond), SPEC)
+
+
 @pytest.mark.parametrize("i", range(6))
 def test_a_profile_may_differ_from_the_arm_by_rounding_and_no_more(i):
     held = profile()
@@ -435,10 +490,12 @@ def test_a_profile_may_differ_from_the_arm_by_rounding_and_no_more(i):
         for spec, message in (
             (replace(SPEC, q_min_rad=but(SPEC.q_min_rad, low + by)),
              f"limits profile {held.name}: joints[{i}].range_rad: expected a range within the arm's own "
-             f"{low + by:.3f} .. {SPEC.q_max_rad[i]:.3f} rad, the file gives {low:.3f} .. {high:.3f}: narrow it there"),
+             f"{low + by:.3f} .. {SPEC.q_max_rad[i]:.3f} rad, the file gives {low:.3f} .. {high:.3f}: "
+             "narrow it there"),
             (replace(SPEC, q_max_rad=but(SPEC.q_max_rad, high - by)),
              f"limits profile {held.name}: joints[{i}].range_rad: expected a range within the arm's own "
-             f"{SPEC.q_min_rad[i]:.3f} .. {high - by:.3f} rad, the file gives {low:.3f} .. {high:.3f}: narrow it there"),
+             f"{SPEC.q_min_rad[i]:.3f} .. {high - by:.3f} rad, the file gives {low:.3f} .. {high:.3f}: "
+             "narrow it there"),
             (replace(SPEC, qd_max_rad_s=but(SPEC.qd_max_rad_s, speed - by)),
              f"limits profile {held.name}: joints[{i}].speed_rad_s: expected at most the arm's own {speed - by:.3f} "
              f"rad/s, the file gives {speed:.3f}: lower it there"),

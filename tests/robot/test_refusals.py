@@ -3,6 +3,7 @@
 import math
 
 import pytest
+from msgspec.structs import replace
 
 from robot.messages import ArmMode, GripCommand, Heading, Hold, JointTarget, Twist
 from robot.safety import GateLimits, Reason
@@ -87,7 +88,8 @@ TOLD = [
     (lambda: check_intent_age(10**9, 1_600_000_000, LIMITS), R.STALE_INTENT,
      "expected rest 0.5 s after an intent, came motion at 0.6 s", 0.0),
     (lambda: check_joint_range(joint(2, 4.0), LIMITS), R.JOINT_RANGE, "joint 3: expected -3 to 3.5 rad, came 4", 0.5),
-    (lambda: check_joint_range(joint(1, -2.25), LIMITS), R.JOINT_RANGE, "joint 2: expected -2 to 2.5 rad, came -2.25", 0.25),
+    (lambda: check_joint_range(joint(1, -2.25), LIMITS), R.JOINT_RANGE,
+     "joint 2: expected -2 to 2.5 rad, came -2.25", 0.25),
     (lambda: check_joint_speed(joint(0, 1.0), joint(0, 1.25), LIMITS), R.JOINT_SPEED,
      "joint 1: expected a change of at most 0.125 rad a tick, came -0.25", 0.125),
     (lambda: check_tool((1.0, 3.0, 0.00004), 1.0, LIMITS), R.WORKSPACE,
@@ -100,9 +102,12 @@ TOLD = [
      "joint 5: expected it within 0.25 rad, came -0.5", 0.25),
     (lambda: check_force(800.0, 0.0, LIMITS), R.FORCE,
      "expected at most 250 N on the tool (700 in a blow), came 800", 550.0),
-    (lambda: check_grip(gripping(opening_m=0.75), LIMITS), R.GRIP, "grip.opening_m: expected 0 to 0.5, came 0.75", 0.25),
-    (lambda: check_grip(gripping(force_n=15.0), LIMITS), R.GRIP, "grip.force_n: expected 20 to 200, came 15", 5.0),
-    (lambda: check_grip(gripping(speed_m_s=1.0), LIMITS), R.GRIP, "grip.speed_m_s: expected 0.25 to 0.75, came 1", 0.25),
+    (lambda: check_grip(gripping(opening_m=0.75), LIMITS), R.GRIP,
+     "grip.opening_m: expected 0 to 0.5, came 0.75", 0.25),
+    (lambda: check_grip(gripping(force_n=15.0), LIMITS), R.GRIP,
+     "grip.force_n: expected 20 to 200, came 15", 5.0),
+    (lambda: check_grip(gripping(speed_m_s=1.0), LIMITS), R.GRIP,
+     "grip.speed_m_s: expected 0.25 to 0.75, came 1", 0.25),
     (lambda: check_outputs(command(REST, digital_out=0x10001), LIMITS), R.OUTPUTS,
      "expected bits within 0xffff, came 0x10001", 0.0),
 ]  # fmt: skip
@@ -113,6 +118,16 @@ def test_a_refusal_says_what_was_expected_what_came_and_by_how_much(check, reaso
     refusal = check()
     assert (refusal.reason, refusal.detail) == (reason, detail)
     assert refusal.amount == pytest.approx(amount, abs=1e-12)
+
+
+FINE = replace(LIMITS, state_max_age_ns=50_000_070, intent_max_age_ns=5_000_005_001)
+
+
+def test_ages_are_told_to_six_digits_and_none_is_off():
+    late = check_state(arm_state(REST, stamp_ns=-60_000_000), command(REST), 0, FINE)
+    assert late.detail == "expected a state of 0 to 50.0001 ms, came 60 ms"
+    old = check_intent_age(0, 6_000_005_001, FINE)
+    assert old.detail == "expected rest 5.00001 s after an intent, came motion at 6.00001 s"
 
 
 def linear(i, value):

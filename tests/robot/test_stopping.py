@@ -96,7 +96,7 @@ def test_the_bound_of_a_turn_is_the_reaches_times_the_turns_of_the_links(turn, b
 
 
 def bent(*, first=0.1, second=0.0, **tool):
-    """The arm with another twist before or behind its upper arm, offsets along and across everywhere, and another tool."""
+    """The arm with another twist beside its upper arm, offsets along and across everywhere, and another tool."""
     rows = [replace(row, a_m=0.1 * (i + 1), d_m=0.05 * (i + 1)) for i, row in enumerate(ARM.joints)]
     rows[1], rows[2] = replace(rows[1], alpha_rad=first), replace(rows[2], alpha_rad=second)
     return replace(ARM, joints=tuple(rows), tool=replace(ARM.tool, **tool))
@@ -130,6 +130,11 @@ def test_what_is_farthest_aside_is_a_link_the_palm_or_the_open_fingers(radius_m,
 def test_links_behind_the_base_may_lie_on_either_side_of_it():
     rows = [replace(row, a_m=abs(row.a_m)) for row in ARM.joints]
     assert Sweep(replace(ARM, joints=tuple(rows))).bound_m([0.1] * 6) == Sweep(ARM).bound_m([0.1] * 6)
+
+
+def test_an_offset_of_the_base_itself_reaches_out_too():
+    parallel, tip = Sweep(bent(first=0.0)), sum(math.hypot(0.1 * k, 0.05 * k) for k in range(2, 7)) + TIP
+    assert parallel.bound_m(vec(a=0.5)) == pytest.approx(0.5 * (0.1 + tip))
 
 
 def test_turns_of_another_number_are_an_error():
