@@ -33,7 +33,7 @@ MOVING = [*LINKS[2:], "palm"]
 """What comes down to the table: the shoulder, which only turns, does not."""
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture
 def built():
     return collision_model(ARM, table_m=TABLE_M, blocks=BLOCKS, hard=HARD, reach_m=REACH_M)
 
@@ -172,6 +172,32 @@ def test_what_never_comes_within_two_millimetres_is_not_looked_at(gap_m, is_look
     assert (Pair("link_1_1", "table", Near.TABLE) in pairs) is is_looked_at
 
 
+@pytest.mark.parametrize("gap_m", [0.00195, 0.0021])
+@pytest.mark.parametrize(("x", "y"), [(1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0)])
+def test_the_base_is_turned_all_the_way_round_to_see_what_its_shoulder_comes_near_to(x, y, gap_m):
+    # The shoulder bulges 0.04 m to one side, 0.065 m thick.
+    out_m = 0.04 + 0.065 + gap_m + 0.02
+    post = Block(name="post", centre_m=(x * out_m, y * out_m, 0.1625), half_m=(0.02, 0.02, 0.001))
+    _, pairs = collision_model(ARM, table_m=TABLE_M, blocks=(post,), hard=HARD, reach_m=REACH_M)
+    assert (Pair("link_1_1", "thing/post", Near.THING) in pairs) is (gap_m < 0.002)
+
+
+def test_both_joints_are_turned_to_see_what_the_upper_arm_comes_near_to():
+    T_b = frames((math.pi / 2.0, 0.0, 0.0, 0.0, 0.0, 0.0))[2]
+    centre = tuple((T_b[:3, :3] @ (0.0, 0.0, 0.138) + T_b[:3, 3]).tolist())
+    post = Block(name="post", centre_m=centre, half_m=(0.01, 0.01, 0.01))
+    _, pairs = collision_model(ARM, table_m=TABLE_M, blocks=(post,), hard=HARD, reach_m=REACH_M)
+    assert Pair("link_2_2", "thing/post", Near.THING) in pairs
+
+
+def test_parts_beside_one_another_in_the_file_are_looked_at_if_a_link_lies_between_them():
+    thick = replace(ARM.capsules[0], radius_m=0.1)
+    _, pairs = collision_model(
+        replace(ARM, capsules=(thick, *ARM.capsules[2:])), table_m=TABLE_M, blocks=(), hard=HARD, reach_m=REACH_M
+    )
+    assert Pair("link_0_0", "link_2_1", Near.OWN) in pairs
+
+
 def test_distances_kept_have_defaults_and_are_told_by_kind():
     assert Hard() == Hard(own_m=0.01, table_m=0.005, thing_m=0.005)
     assert [HARD.of(near) for near in (Near.OWN, Near.TABLE, Near.THING)] == [0.011, 0.012, 0.013]
@@ -233,18 +259,7 @@ def test_the_gap_to_a_table_is_the_height_over_it_less_what_is_kept(height_m):
 
 @pytest.mark.parametrize("away_m", [0.03, 0.013, 0.004, -0.01])
 def test_the_gap_of_the_palm_to_a_block_is_that_of_its_box_and_not_of_the_ball_around_it(away_m):
-    clear = Clearance(ARM, bare(table_m=-3.0), hard=HARD)
-    palm = placed(clear._model, ARM.home_rad).geom("palm")
-    # Home points straight down: a block that stands beside the palm, under the wrist's links.
-    side = palm.xmat.reshape(3, 3)[:, 0]
-    assert abs(palm.xmat.reshape(3, 3)[2, 2]) == pytest.approx(1.0, abs=1e-3)
-    axis = int(np.argmax(np.abs(side)))
-    reach_m = float(np.abs(palm.xmat.reshape(3, 3)[axis, :2]) @ (0.032, 0.06))
-    at = [float(palm.xpos[0]), float(palm.xpos[1])]
-    at[axis] += reach_m + away_m + 0.02
-    height_m = float(palm.xpos[2]) + 0.0 - 0.02 + 3.0
-    button = replace(SCENARIO.buttons[0], position_m=tuple(at), spread_m=(0.0, 0.0), diameter_m=0.04, height_m=height_m)
-    near = Clearance(ARM, bare(button, table_m=-3.0), hard=HARD)
+    near, button = beside_the_palm(away_m)
     gap_m = near.gap(ARM.home_rad)
     (one,) = [c for c in near.closest(ARM.home_rad, within_m=0.06) if c.pair.part == "palm"]
     assert one.gap_m == pytest.approx(gap_m, abs=1e-6)
@@ -254,8 +269,31 @@ def test_the_gap_of_the_palm_to_a_block_is_that_of_its_box_and_not_of_the_ball_a
         (near.gap(tuple(q + 1e-6 * (k == i) for k, q in enumerate(ARM.home_rad))) - gap_m) / 1e-6 for i in range(6)
     ]
     assert one.slope_m_rad == pytest.approx(slope, abs=2e-3)
-    assert near.closest(ARM.home_rad, within_m=one.gap_m + 1e-9) != []
+    assert one in near.closest(ARM.home_rad, within_m=one.gap_m)
     assert [c for c in near.closest(ARM.home_rad, within_m=one.gap_m - 1e-6) if c.pair.part == "palm"] == []
+
+
+def beside_the_palm(away_m):
+    """A table so far down that nothing is near it, and a post so far beside the palm."""
+    palm = placed(Clearance(ARM, bare(table_m=-3.0), hard=HARD)._model, ARM.home_rad).geom("palm")
+    R = palm.xmat.reshape(3, 3)
+    axis = int(np.argmax(np.abs(R[:2, 0])))
+    at = [float(palm.xpos[0]), float(palm.xpos[1])]
+    at[axis] += float(np.abs(R[axis, :2]) @ (0.032, 0.06)) + away_m + 0.02
+    height_m = float(palm.xpos[2]) - 0.02 + 3.0
+    post = replace(SCENARIO.buttons[0], position_m=tuple(at), spread_m=(0.0, 0.0), diameter_m=0.04, height_m=height_m)
+    return Clearance(ARM, bare(post, table_m=-3.0), hard=HARD), post
+
+
+def test_what_only_the_ball_around_the_palm_comes_near_to_is_out_of_reach():
+    far, _ = beside_the_palm(0.083)
+    assert [c for c in far.closest(ARM.home_rad, within_m=1.0) if c.pair.part == "palm"] == []
+
+
+def test_what_just_touches_has_no_direction_to_yield_in_and_is_not_told():
+    touching = over_the_table(0.0)
+    assert touching.gap(LOW) == pytest.approx(-0.012, abs=1e-9)
+    assert touching.closest(LOW, within_m=0.0) == []
 
 
 def test_each_pair_is_told_once():
