@@ -109,6 +109,14 @@ def test_giving_way_and_braking_end_where_a_gain_begins(sign):
         assert (refusal is None) is passes
 
 
+@pytest.mark.parametrize("sign", [-1.0, 1.0])
+def test_a_joint_may_brake_to_rest_however_far_ahead_it_is_measured(sign):
+    last, before, ahead = REST, joint(0, -sign * 0.25), joint(0, sign * 0.25)
+    for step, passes in ((0.0, True), (-0.0625, True), (-0.125, False)):
+        refusal = check_joint_acceleration(joint(0, sign * step), last, before, ahead, HELD)
+        assert (refusal is None) is passes
+
+
 def test_a_joint_that_brakes_does_not_hide_the_next():
     q, last, before = (0.0, 0.5, *REST[2:]), REST, (-0.25, *REST[1:])
     assert check_joint_acceleration(q, last, before, last, HELD).detail.startswith("joint 2: ")
