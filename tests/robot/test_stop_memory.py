@@ -7,6 +7,7 @@ from config.loader import resolve
 from robot.hal.fake import FakeArm
 from robot.kinematics import Kinematics, ToolChain
 from robot.safety import Braking, GateLimits, StopCheck
+from robot.safety.sweep import Sweep
 from tests.support.stations import arm_state
 
 ARM = resolve().arm
@@ -99,3 +100,16 @@ def test_a_way_is_halved_until_nothing_can_hide_between_and_no_further():
     check = StopCheck(ARM, Thin(9.0), limits=OPEN, tick_s=TICK_S, braking=braking)
     assert check.check(turned(0.01), START, STATE) is not None
     assert 3 <= len(asked) <= 130
+
+
+@pytest.mark.parametrize("i", range(5))
+def test_a_body_between_two_clear_ends_is_found_whichever_joint_turns(i):
+    reach_m = 0.9 * Sweep(ARM).bound_m([float(k == i) for k in range(6)])
+
+    class Thin(Bodies):
+        def gap(self, q_rad):
+            return min(self.most_m, reach_m * abs(q_rad[i] - START[i] - 0.045) - 0.001)
+
+    braking = Braking(deceleration_rad_s2=16.0, least_share=0.5)
+    check = StopCheck(ARM, Thin(9.0), limits=OPEN, tick_s=TICK_S, braking=braking)
+    assert check.check(turned(0.01, i), START, STATE) is not None
