@@ -1,12 +1,14 @@
-# make run | test | check | bench | clean
+# make run | test | check | bench | mutation | coverage | clean
 PYTHON ?= python3.11
 VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 RUN := runs/main
 BENCHES := twin grasp learning servo
+SAFETY_TESTS := $(addprefix tests/robot/test_,$(addsuffix .py,arming arming_words challenge checks checks_profile clearance \
+  collision_model gate gate_order lease profile_words refusals states stop_check stop_memory stopping tenure))
 
-.PHONY: run setup check test test-slow bench clean
+.PHONY: run setup check test test-slow bench mutation coverage clean
 
 run: setup
 	$(BIN)/autotelic learn --scenario paper --rig twin --preset default --seed 0 --out $(RUN) --resume
@@ -35,6 +37,17 @@ test-slow: setup
 bench: setup
 	@failed=0; for name in $(BENCHES); do $(BIN)/autotelic bench $$name || failed=1; done; exit $$failed
 
+# Mutants of robot/safety/ against the tests of that room (docs/mutation.md); what survives is listed at the end.
+mutation: $(STAMP)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[mutation]'
+	$(BIN)/mutmut run --max-children 1
+	$(BIN)/mutmut results
+
+coverage: $(STAMP)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[mutation]'
+	$(BIN)/coverage run --branch --source=robot/safety -m pytest -q $(SAFETY_TESTS)
+	$(BIN)/coverage report --show-missing --fail-under=100
+
 clean:
-	rm -rf build dist *.egg-info .pytest_cache .ruff_cache .hypothesis .import_linter_cache
+	rm -rf build dist *.egg-info .pytest_cache .ruff_cache .hypothesis .import_linter_cache mutants .coverage
 	find config learning perception robot sim_twin tests -name __pycache__ -prune -exec rm -rf {} +
