@@ -24,7 +24,6 @@ MEANINGS = {
     "tool_cone": "the tool may tilt no further",
     "stop_ahead": "the arm could not stop clear of something for much longer, braking",
     "clearance": "the arm comes near something, slower",
-    "stop_ahead": "a stop would come too near something, braking",
     "singularity": "the arm nears a place where it loses a direction, slower",
     "no_intent": "nothing came in time, at rest",
     "object_lost": "what the hand held slipped away",
