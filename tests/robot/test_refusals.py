@@ -30,6 +30,7 @@ LIMITS = GateLimits(
     workspace_m=((-1.0, -2.0, -3.0), (1.5, 2.5, 3.5)),
     tip_min_m=0.25,
     tracking_error_rad=0.25,
+    contact_n=15.0,
     force_max_n=250.0,
     impact_max_n=700.0,
     opening_m=(0.0, 0.5),
