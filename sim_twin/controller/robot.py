@@ -108,13 +108,14 @@ class VirtualRobot:
         if not machine.modes.may_move:
             drive.stiffen()
         machine.world.digital_out = self.box.drive(machine.io.digital_out)
-        drive.is_force_borne = bool(machine.modes.safety_status_bits & _PROTECTIVE_BIT)
         breach = drive.tick()
         if self.disturb is not None:
             drive.measured = self.disturb(drive.measured)
         if breach is not None:
             self._stop_for(breach)
         self.programs.obey(machine.modes.tick(is_standing=drive.is_standing))
+        if drive.is_braked and machine.modes.may_move and machine.modes.robot is RobotMode.RUNNING:
+            drive.engage()  # the brakes came in because it pressed on while it was stopped, and it is released
         machine.n_standing = machine.n_standing + 1 if drive.is_standing else 0
         machine.io.digital_in = self.box.sense(machine.world.table.read_inputs()) | self.forced_inputs
         machine.io.analog_in_v = self.box.measure(machine.world.table.travel)
@@ -160,7 +161,7 @@ class VirtualRobot:
     def _stop_for(self, breach: Breach) -> None:
         cause = breach.cause
         bits = self.machine.modes.safety_status_bits
-        is_pressing_still = cause is Cause.FORCE_VIOLATION and self.machine.drive.is_force_borne
+        is_pressing_still = cause is Cause.FORCE_VIOLATION and bits & _PROTECTIVE_BIT
         if is_pressing_still or bits & (_VIOLATION_BIT if cause.is_violation else _PROTECTIVE_BIT):
             # What presses goes on pressing while the arm comes to rest: one blow is one stop.
             return

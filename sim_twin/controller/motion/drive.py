@@ -86,7 +86,6 @@ class TwinDrive:
         contact: Whether the tool met something (tool_contact).
         limits: Held from the next slice on.
         is_braked: The joints are locked and the servos have no power.
-        is_force_borne: The arm is being stopped for its force: however hard it still presses, its power is not cut.
         n_slices: Slices since the start.
 
     Raises:
@@ -120,7 +119,6 @@ class TwinDrive:
         self.n_slices = 0
         self._torque_nm: Array | None = None
         self._is_compliant = False
-        self.is_force_borne = False
         self.lock()
         self.measured = self._read()
 
@@ -283,8 +281,7 @@ class TwinDrive:
             # Nobody asked for where torques lead: what is measured is judged as what is asked.
             breach = breach_felt(self.limits, felt) or (None if torque_nm is None else self._led_beyond())
             if breach is not None:
-                is_borne = breach.cause is Cause.FORCE_VIOLATION and self.is_force_borne
-                self.stop(is_cut=breach.cause.is_violation and not is_borne)
+                self.stop(is_cut=breach.cause.is_violation)
         return breach
 
     def stop(self, *, is_cut: bool = False) -> None:

@@ -179,7 +179,7 @@ def test_a_move_beside_torques_is_a_conflict(main, thread):
     assert any("another thread" in line for line in lines(robot))
 
 
-def test_an_arm_that_presses_on_while_it_is_stopped_keeps_its_power_and_moves_once_it_is_released():
+def test_an_arm_that_presses_on_while_it_is_stopped_moves_again_once_it_is_released():
     robot = started(FOREVER)
     robot.programs.handle(Event.PROTECTIVE_STOP)
     drive = robot.machine.drive
