@@ -40,12 +40,12 @@ bench: setup
 # Mutants of robot/safety/ against the tests of that room (docs/mutation.md); what survives is listed at the end.
 mutation: $(STAMP)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[mutation]'
-	$(BIN)/mutmut run --max-children 1
+	NUMBA_DISABLE_JIT=1 $(BIN)/mutmut run --max-children 1
 	$(BIN)/mutmut results
 
 coverage: $(STAMP)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[mutation]'
-	$(BIN)/coverage run --branch --source=robot/safety -m pytest -q $(SAFETY_TESTS)
+	NUMBA_DISABLE_JIT=1 $(BIN)/coverage run --branch --source=robot/safety -m pytest -q $(SAFETY_TESTS)
 	$(BIN)/coverage report --show-missing --fail-under=100
 
 clean:

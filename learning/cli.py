@@ -18,10 +18,10 @@ from learning.figures import curriculum_figure, performance_figure, save
 from learning.progress import Progress, Status
 from learning.report import Run, group_runs, load_run, load_runs, report_of
 from learning.run_folder import RunFolder
-from learning.stop_request import StopRequest
 from learning.stopwatch import Stopwatch
 from learning.telling import explanation_table, profile_table, report_table, score_table, summary_lines
 from learning.wanted import Wanted
+from robot.stop_request import StopRequest
 
 if TYPE_CHECKING:
     from learning.session import Session
@@ -29,6 +29,10 @@ if TYPE_CHECKING:
 __all__ = ["evaluate", "explain", "learn", "report"]
 
 EXIT_FAILED, EXIT_USAGE, EXIT_INTERRUPTED = 1, 2, 130
+STOPPING = (
+    "stopping after this epoch and the evaluations that are due or under way "
+    "(once more: at once, losing what came after the last checkpoint)"
+)
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -101,7 +105,7 @@ def _run(session: "Session", folder: RunFolder, console: Console, n_workers: int
     )
     how_to_go_on = f"go on with: autotelic learn --resume --out {folder.path}"
     try:
-        with progress, StopRequest(progress.say) as stop:
+        with progress, StopRequest(lambda: progress.say(STOPPING)) as stop:
             for remark in session.remarks:
                 progress.say(remark)
             ended = session.run(progress, n_workers=n_workers, should_stop=stop)

@@ -24,7 +24,7 @@ __all__ = [
 ]
 
 PARTS = (ArmPart.TCP, ArmPart.FLANGE, ArmPart.ELBOW)
-"""Order of the points that kinematics.ToolChain.points returns."""
+"""Order of the points that chain.ToolChain.points returns."""
 FAR_M = 0.01
 CONE_NEAR_RAD = 1.0
 SLOWEST_SHARE = 0.1

@@ -2,9 +2,20 @@
 
 import math
 
-from robot.messages import Quat, Vec3
+from robot.compiled import compiled
+from robot.messages import Quat, Vec3, Vec6
 
-__all__ = ["inside_box", "quat_of_rotation_vector", "rotated", "tool_offset", "turn_about_vertical", "unwound"]
+__all__ = [
+    "between",
+    "difference",
+    "inside_box",
+    "quat_of_rotation_vector",
+    "rotated",
+    "stepped",
+    "tool_offset",
+    "turn_about_vertical",
+    "unwound",
+]
 
 
 def tool_offset(point_m: Vec3, tcp_m: Vec3, yaw_rad: float) -> Vec3:
@@ -17,15 +28,17 @@ def tool_offset(point_m: Vec3, tcp_m: Vec3, yaw_rad: float) -> Vec3:
     return c * dx + s * dy, s * dx - c * dy, tcp_m[2] - point_m[2]
 
 
-def inside_box(point_m: Vec3, low_m: Vec3, high_m: Vec3, tolerance_m: float = 0.0) -> bool:
+@compiled
+def inside_box(point_m: Vec3, low_m: Vec3, high_m: Vec3) -> bool:
     """Return whether a point lies in an axis-aligned box; a point that is not finite does not."""
     return (
-        low_m[0] - tolerance_m <= point_m[0] <= high_m[0] + tolerance_m
-        and low_m[1] - tolerance_m <= point_m[1] <= high_m[1] + tolerance_m
-        and low_m[2] - tolerance_m <= point_m[2] <= high_m[2] + tolerance_m
+        low_m[0] <= point_m[0] <= high_m[0]
+        and low_m[1] <= point_m[1] <= high_m[1]
+        and low_m[2] <= point_m[2] <= high_m[2]
     )
 
 
+@compiled
 def turn_about_vertical(quat: Quat) -> float:
     """Return the yaw in (-pi, pi] of a unit quaternion, scalar first: the angle of its turned x axis in the plane."""
     w, x, y, z = quat
@@ -49,6 +62,26 @@ def rotated(vector: Vec3, quat: Quat) -> Vec3:
     return x + w * p + b * r - c * q, y + w * q + c * p - a * r, z + w * r + a * q - b * p
 
 
+@compiled
 def unwound(angle: float, reference: float) -> float:
     """Return the angle plus the whole turns that bring it nearest a reference."""
     return angle - math.tau * round((angle - reference) / math.tau)
+
+
+@compiled
+def stepped(q: Vec6, step: Vec6, share: float) -> Vec6:
+    """Return joints a share of a step farther."""
+    (a, b, c, d, e, f), (u, v, w, x, y, z) = q, step
+    return a + share * u, b + share * v, c + share * w, d + share * x, e + share * y, f + share * z
+
+
+@compiled
+def difference(a: Vec6, b: Vec6) -> Vec6:
+    """Return the step from joints b to joints a."""
+    return a[0] - b[0], a[1] - b[1], a[2] - b[2], a[3] - b[3], a[4] - b[4], a[5] - b[5]
+
+
+@compiled
+def between(a: Vec6, b: Vec6, share: float) -> Vec6:
+    """Return joints a share of the way from a to b, beyond b where it is more than 1."""
+    return stepped(a, difference(b, a), share)

@@ -11,10 +11,10 @@ from config.rig import Rig
 from config.rules import RuleSet
 from config.scenario import Scenario
 from robot.cell import Cell
+from robot.chain import ToolChain
 from robot.envelope import Envelope
 from robot.errors import ArmRefusedError, RobotConfigError, StaleStateError, WireError
 from robot.hal.protocols import Arm
-from robot.kinematics import ToolChain
 from robot.messages import ArmCommand, ArmState, GripCommand, Intent, Limited, Vec3, Verdict
 from robot.motion import Approach, Mover
 from robot.safety import Braking, Clearance, Gate, GateLimits, Hard, Reason, StopCheck, check_profile_fits

@@ -12,10 +12,11 @@ from config.arm import ArmConfig
 from config.cell import CellConfig
 from config.rig import Rig
 from config.scenario import Scenario
+from robot.chain import ToolChain
 from robot.clock import LockStepClock
 from robot.errors import NotEngagedError, StaleStateError
 from robot.hal.protocols import Camera, Clock
-from robot.kinematics import Kinematics, ToolChain
+from robot.kinematics import Kinematics
 from robot.messages import (
     ArmCommand,
     ArmMode,

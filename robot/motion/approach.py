@@ -14,11 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from config.arm import ArmConfig
-from robot.kinematics import ToolChain
+from robot.chain import ToolChain
+from robot.compiled import compiled
 from robot.messages import Vec3, Vec6
 from robot.safety import Braking, Clearance
 
-__all__ = ["Approach", "Margins", "Wall", "singular_room", "yielding"]
+__all__ = ["Approach", "Margins", "Wall", "links_of", "singular_room", "yielding"]
 
 Array = NDArray[np.float64]
 Inverse = Callable[[Vec3, Vec6], Vec6 | None]
@@ -34,6 +35,10 @@ SHARE, SINGULAR_SHARE = 0.6, 0.25
 """Towards a singularity the joints go the faster the nearer it is: the tool is slowed sooner."""
 """A step beside a wall that is too near already leads away by as much."""
 DIFFERENCE_RAD = 1e-6
+
+
+Rooms = tuple[float, float, float, float]
+"""What is left to the margins of bodies, elbow, wrist and shoulder."""
 
 
 class Margins(msgspec.Struct, frozen=True, kw_only=True):
@@ -85,16 +90,50 @@ def yielding(step: Sequence[float], walls: Sequence[Wall]) -> tuple[list[float],
     return left, blamed
 
 
-def singular_room(arm: ArmConfig, q: Vec6) -> tuple[float, float, float]:
+@compiled
+def singular_room(links_m: Vec3, q: Vec6) -> Vec3:
     """Return the three factors of the tool's Jacobian determinant: sines of elbow and wrist 2, wrist 2's reach (m).
 
     det J of an arm with this offset geometry is proportional to their product; each is 0 at one singularity.
+
+    Args:
+        links_m: a of upper arm and forearm, d of wrist 2 (links_of).
+        q: joints.
     """
-    rows = arm.joints
-    upper, fore, wrist = rows[1].a_m, rows[2].a_m, rows[4].d_m
+    upper, fore, wrist = links_m
     q23 = q[1] + q[2]
     reach = upper * math.cos(q[1]) + fore * math.cos(q23) + wrist * math.sin(q23 + q[3])
     return abs(math.sin(q[2])), abs(math.sin(q[4])), abs(reach)
+
+
+def links_of(arm: ArmConfig) -> Vec3:
+    """Return what `singular_room` asks of an arm."""
+    rows = arm.joints
+    return rows[1].a_m, rows[2].a_m, rows[4].d_m
+
+
+@compiled
+def _turn_m(a: Vec6, b: Vec6, moved_m: float) -> float:
+    """Return how far the fastest joint turns for a metre of the tool."""
+    most = 0.0
+    for u, v in zip(a, b):  # noqa: B905 - compiled: of one length by their types
+        most = max(most, abs(u - v))
+    return most / moved_m
+
+
+@compiled
+def _is_far(at: Rooms, there: Rooms, near_m: float) -> bool:
+    """Return whether a step takes no more than its share of any room, or ends where bodies are out of sight.
+
+    Args:
+        at: rooms before it.
+        there: and after it.
+        near_m: bodies with more room than this are not looked at.
+    """
+    if there[0] < near_m and not there[0] >= at[0] * (1.0 - SHARE) >= 0.0:
+        return False
+    (_, a, b, c), (_, d, e, f), left = at, there, 1.0 - SINGULAR_SHARE
+    return d >= a * left >= 0.0 and e >= b * left >= 0.0 and f >= c * left >= 0.0
 
 
 class Approach:
@@ -103,7 +142,7 @@ class Approach:
     def __init__(
         self, arm: ArmConfig, clearance: Clearance, *, braking: Braking, margins: Margins | None = None
     ) -> None:
-        self._arm, self._clearance = arm, clearance
+        self._clearance = clearance
         self._speed_m_s, self._braking_m_s2 = arm.motion.speed_m_s, arm.motion.acceleration_m_s2
         self._chain = ToolChain(arm)
         self._workspace_m = arm.motion.workspace_m
@@ -111,8 +150,10 @@ class Approach:
         self._at_m: Vec3 | None = None
         self._q: Vec6 | None = None
         self._rooms_of: Vec6 | None = None
-        self._rooms_there: tuple[float, ...] = ()
+        self._rooms_there: Rooms = (0.0, 0.0, 0.0, 0.0)
+        self._links_m = links_of(arm)
         self._margins = margins or Margins()
+        self._near_m = clearance.most_m - self._margins.clearance_m
         self._least = (self._margins.elbow, self._margins.wrist, self._margins.shoulder_m)
 
     def clear_place(self, at_m: Vec3, target_m: Vec3, *, now_rad: Vec6, joints_at: Inverse) -> tuple[Vec3, str | None]:
@@ -131,7 +172,7 @@ class Approach:
             at_m, q_at = self._chain.tcp(now_rad), now_rad
         q = joints_at(target_m, q_at)
         overrun_m = 0.0 if q is None else self._overrun_m(q_at, q, math.dist(at_m, target_m))
-        if q is not None and overrun_m == 0.0 and self._is_far(self._rooms(q_at), self._rooms(q)):
+        if q is not None and overrun_m == 0.0 and _is_far(self._rooms(q_at), self._rooms(q), self._near_m):
             place_m, because = self._take(target_m, q), None
         else:
             place_m, because = self._yield(at_m, target_m, q_at, overrun_m, joints_at)
@@ -163,23 +204,14 @@ class Approach:
         self._at_m, self._q = place_m, q
         return place_m
 
-    def _rooms(self, q: Vec6) -> tuple[float, ...]:
+    def _rooms(self, q: Vec6) -> Rooms:
         """Return what is left to each margin."""
         if q != self._rooms_of:
-            margins = (self._margins.clearance_m, *self._least)
-            here = (self._clearance.gap(q), *singular_room(self._arm, q))
-            self._rooms_of, self._rooms_there = q, tuple(h - m for h, m in zip(here, margins, strict=True))
+            elbow, wrist, shoulder_m = singular_room(self._links_m, q)
+            a, b, c = self._least
+            room_m = self._clearance.gap(q) - self._margins.clearance_m
+            self._rooms_of, self._rooms_there = q, (room_m, elbow - a, wrist - b, shoulder_m - c)
         return self._rooms_there
-
-    def _is_far(self, at: tuple[float, ...], there: tuple[float, ...]) -> bool:
-        """Whether a step takes no more than its share of any room, or ends where bodies are too far to be looked at."""
-        gap_at, gap_there = at[0], there[0]
-        if (
-            gap_there < self._clearance.most_m - self._margins.clearance_m
-            and not gap_there >= gap_at * (1.0 - SHARE) >= 0.0
-        ):
-            return False
-        return all(b >= a * (1.0 - SINGULAR_SHARE) >= 0.0 for a, b in zip(at[1:], there[1:], strict=True))
 
     def _overrun_m(self, a: Vec6, b: Vec6, moved_m: float) -> float:
         """Return how much farther than motion's own braking a stop at the worst may carry the tool here.
@@ -187,7 +219,7 @@ class Approach:
         Motion brakes the tool at its acceleration, a stop the fastest joint at its own: where a joint turns far for a
         small way of the tool, as over the base, a stop takes longer.
         """
-        turn_rad_m = max([abs(u - v) for u, v in zip(a, b, strict=True)]) / moved_m
+        turn_rad_m = _turn_m(a, b, moved_m)
         return max(0.0, self._speed_m_s**2 / 2.0 * (turn_rad_m / self._stop_rad_s2 - 1.0 / self._braking_m_s2))
 
     def _yield(
@@ -243,7 +275,7 @@ class Approach:
             yield Wall("clearance", c.gap_m - margin_m, c.slope_m_rad, SHARE)
 
     def _singular(self, q: Vec6) -> Iterator[Wall]:
-        here = singular_room(self._arm, q)
+        here = singular_room(self._links_m, q)
         for k, (room, least) in enumerate(zip(here, self._least, strict=True)):
             if room < 4.0 * least:
                 yield Wall("singularity", room - least, self._singular_slope(q, k, room), SINGULAR_SHARE)
@@ -253,7 +285,7 @@ class Approach:
         for i in range(6):
             moved = list(q)
             moved[i] += DIFFERENCE_RAD
-            slope.append((singular_room(self._arm, _vec6(moved))[k] - here) / DIFFERENCE_RAD)
+            slope.append((singular_room(self._links_m, _vec6(moved))[k] - here) / DIFFERENCE_RAD)
         return tuple(slope)
 
     def _is_no_worse(self, q_at: Vec6, q: Vec6, extra_m: float) -> bool:

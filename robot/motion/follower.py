@@ -95,7 +95,7 @@ class Follower:
         return self._kinematics.tcp(q_rad)
 
     def points(self, q_rad: Vec6) -> tuple[tuple[Vec3, Vec3, Vec3], float]:
-        """Return tool centre point, flange and elbow, and how far the tool points down (kinematics.ToolChain)."""
+        """Return tool centre point, flange and elbow, and how far the tool points down (chain.ToolChain)."""
         return self._kinematics.chain.points(q_rad)
 
     def tcp_and_lowest(self, q_rad: Vec6) -> tuple[Vec3, float]:

@@ -36,7 +36,7 @@ def share_of_step(
         now_rad: the last command.
         last_rad: the one before.
         q_rad: the one that is wanted.
-        now: points and tilt for the last command, as kinematics.ToolChain.points returns them.
+        now: points and tilt for the last command, as chain.ToolChain.points returns them.
         to: those for the one that is wanted.
         envelope: the limits.
     """

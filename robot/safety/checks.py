@@ -5,6 +5,7 @@ from enum import StrEnum
 
 import msgspec
 
+from robot.compiled import compiled
 from robot.geometry import inside_box
 from robot.messages import (
     ArmCommand,
@@ -168,22 +169,42 @@ def check_intent_age(intent_ns: int, now_ns: int, limits: GateLimits) -> Refusal
     )
 
 
+@compiled
+def joint_out_of_range(q_rad: Vec6, low_rad: Vec6, high_rad: Vec6) -> int:
+    """Return the first joint outside its range, -1 where none is."""
+    for i in range(N_JOINTS):
+        if not low_rad[i] <= q_rad[i] <= high_rad[i]:
+            return i
+    return -1
+
+
+@compiled
+def joint_too_far(a_rad: Vec6, b_rad: Vec6, most_rad: Vec6) -> int:
+    """Return the first joint of which two angles are farther apart than they may be, -1 where none is."""
+    for i in range(N_JOINTS):
+        if not abs(a_rad[i] - b_rad[i]) <= most_rad[i]:
+            return i
+    return -1
+
+
 def check_joint_range(q_rad: Vec6, limits: GateLimits) -> Refusal | None:
     """Refuse a joint outside its range."""
-    for i, (low, q, high) in enumerate(zip(limits.q_min_rad, q_rad, limits.q_max_rad, strict=True)):
-        if not low <= q <= high:
-            detail = f"joint {i + 1}: expected {low:g} to {high:g} rad, came {q:g}"
-            return Refusal(Reason.JOINT_RANGE, detail, max(low - q, q - high))
-    return None
+    i = joint_out_of_range(q_rad, limits.q_min_rad, limits.q_max_rad)
+    if i < 0:
+        return None
+    low, q, high = limits.q_min_rad[i], q_rad[i], limits.q_max_rad[i]
+    detail = f"joint {i + 1}: expected {low:g} to {high:g} rad, came {q:g}"
+    return Refusal(Reason.JOINT_RANGE, detail, max(low - q, q - high))
 
 
 def check_joint_speed(q_rad: Vec6, previous_rad: Vec6, limits: GateLimits) -> Refusal | None:
     """Refuse a joint that would move further in one tick than its speed allows."""
-    for i, (now, before, most) in enumerate(zip(q_rad, previous_rad, limits.joint_step_rad, strict=True)):
-        if not abs(now - before) <= most:
-            detail = f"joint {i + 1}: expected a change of at most {most:g} rad a tick, came {now - before:g}"
-            return Refusal(Reason.JOINT_SPEED, detail, abs(now - before) - most)
-    return None
+    i = joint_too_far(q_rad, previous_rad, limits.joint_step_rad)
+    if i < 0:
+        return None
+    step, most = q_rad[i] - previous_rad[i], limits.joint_step_rad[i]
+    detail = f"joint {i + 1}: expected a change of at most {most:g} rad a tick, came {step:g}"
+    return Refusal(Reason.JOINT_SPEED, detail, abs(step) - most)
 
 
 def check_tool(tcp: Vec3, lowest_m: float, limits: GateLimits) -> Refusal | None:
@@ -206,11 +227,12 @@ def check_tool(tcp: Vec3, lowest_m: float, limits: GateLimits) -> Refusal | None
 
 def check_tracking(q_rad: Vec6, measured_rad: Vec6, limits: GateLimits) -> Refusal | None:
     """Refuse when the measured joints do not follow, or are not finite."""
-    for i, (asked, is_at) in enumerate(zip(q_rad, measured_rad, strict=True)):
-        if not abs(asked - is_at) <= limits.tracking_error_rad:
-            detail = f"joint {i + 1}: expected it within {limits.tracking_error_rad:g} rad, came {is_at - asked:g}"
-            return Refusal(Reason.TRACKING, detail, abs(asked - is_at) - limits.tracking_error_rad)
-    return None
+    most = limits.tracking_error_rad
+    i = joint_too_far(q_rad, measured_rad, (most, most, most, most, most, most))
+    if i < 0:
+        return None
+    off = measured_rad[i] - q_rad[i]
+    return Refusal(Reason.TRACKING, f"joint {i + 1}: expected it within {most:g} rad, came {off:g}", abs(off) - most)
 
 
 def check_force(force_n: float, force_before_n: float, limits: GateLimits) -> Refusal | None:

@@ -3,9 +3,9 @@
 import math
 from collections.abc import Callable
 
+from robot.chain import ToolChain
 from robot.envelope import Envelope
 from robot.hal.protocols import Arm
-from robot.kinematics import ToolChain
 from robot.messages import ArmCommand, ArmState, Outcome, Vec6, Verdict
 from robot.safety.checks import (
     Reason,

@@ -1,15 +1,15 @@
 """Whether the arm could be stopped after a command before it leaves its limits or comes too near to anything."""
 
-from operator import le
-
 from config.arm import ArmConfig
-from robot.kinematics import ToolChain
-from robot.messages import ArmState, Vec3, Vec6
+from robot.chain import ToolChain
+from robot.compiled import compiled
+from robot.geometry import between, difference, stepped
+from robot.messages import ArmState, Box3, Vec3, Vec6
 from robot.safety.checks import Reason, Refusal
 from robot.safety.clearance import Clearance
 from robot.safety.limits import GateLimits
 from robot.safety.stopping import Braking
-from robot.safety.sweep import Sweep
+from robot.safety.sweep import Links, Sweep, swept_m
 
 __all__ = ["StopCheck"]
 
@@ -18,6 +18,59 @@ FINE_M = 0.001
 TINY_M = 1e-6
 OVERRUN_M = 0.003
 """How far a stop may overrun the fences: less than the fingertips' least height over the table."""
+
+Known = tuple[float, float, float]
+"""Bounds where the last command led: on the gap, and how far the tool is inside its fences, every joint its range."""
+
+
+@compiled
+def _looked_ahead(
+    q_rad: Vec6, before_rad: Vec6, known: Known, far_m: Vec6, links_m: Links, law: Vec3
+) -> tuple[Known, bool, Vec6, bool, Vec6, float]:
+    """Return what a command leads to when the arm is stopped after it.
+
+    Args:
+        q_rad: the command.
+        before_rad: the one before.
+        known: what was known there.
+        far_m: reaches of Sweep.
+        links_m: the rest of them.
+        law: a stop turns a joint on by its step times the fastest joint's step times the first; at the worst the second
+            times as far; and before that it goes on for so many ticks.
+
+    Returns:
+        What is known at the command; whether a limit may be near, and where the arm comes to rest as it should; whether
+        a body may be near, where it comes to rest at the worst, and how far no point of it goes until then.
+    """
+    step = difference(q_rad, before_rad)
+    fastest = 0.0
+    for s in step:
+        fastest = max(fastest, abs(s))
+    stretch, weaker, lead = law
+    moved_m = swept_m(step, far_m, links_m)
+    room_m, fence_m, range_rad = known[0] - moved_m, known[1] - moved_m, known[2] - fastest
+    share = fastest * stretch + lead
+    is_limit_near = not (fence_m > moved_m * share and range_rad > fastest * share)
+    rest = stepped(q_rad, step, share)
+    share = fastest * stretch * weaker + lead
+    ahead_m = moved_m * share
+    is_body_near = not room_m > ahead_m
+    return (room_m, fence_m, range_rad), is_limit_near, rest, is_body_near, stepped(q_rad, step, share), ahead_m
+
+
+@compiled
+def _fence_room(tcp_m: Vec3, lowest_m: float, workspace_m: Box3, tip_min_m: float) -> float:
+    (x, y, z), (low, high) = tcp_m, workspace_m
+    room = min(x - low[0], high[0] - x, y - low[1], high[1] - y)
+    return min(room, z - low[2], high[2] - z, lowest_m - tip_min_m)
+
+
+@compiled
+def _range_room(q: Vec6, low: Vec6, high: Vec6) -> float:
+    room = q[0] - low[0]
+    for at, least, most in zip(q, low, high):  # noqa: B905 - compiled: of one length by their types
+        room = min(room, at - least, most - at)
+    return room
 
 
 class StopCheck:
@@ -51,10 +104,8 @@ class StopCheck:
         self._clearance, self._limits, self._tick_s = clearance, limits, tick_s
         self._chain = ToolChain(arm)
         self._sweep = Sweep(arm)
-        # A stop turns a joint on by its step times the fastest joint's step times this.
-        self._stretch = 1.0 / (2.0 * tick_s * tick_s * braking.deceleration_rad_s2)
-        self._weaker = 1.0 / braking.least_share
-        self._lead = lead_s / tick_s
+        stretch = 1.0 / (2.0 * tick_s * tick_s * braking.deceleration_rad_s2)
+        self._law = (stretch, 1.0 / braking.least_share, lead_s / tick_s)
         self.seed()
 
     def seed(self) -> None:
@@ -74,32 +125,28 @@ class StopCheck:
             state: what the arm measured. A command that falls back towards it, as motion lets it in contact, drives
                 the arm no faster than it goes.
         """
-        step = [a - b for a, b in zip(q_rad, before_rad, strict=True)]
-        refusal = self._check_step(q_rad, before_rad, step)
+        refusal = self._check_step(q_rad, before_rad, before_rad)
         if refusal is not None and self._is_falling_back(q_rad, before_rad, state.q_rad):
-            return self._check_step(q_rad, before_rad, [v * self._tick_s for v in state.qd_rad_s])
+            return self._check_step(q_rad, before_rad, stepped(q_rad, state.qd_rad_s, -self._tick_s))
         return refusal
 
     def _is_falling_back(self, q: Vec6, before: Vec6, measured: Vec6) -> bool:
-        now, then = ([a - b for a, b in zip(x, measured, strict=True)] for x in (q, before))
-        return self._sweep.bound_m(now) < self._sweep.bound_m(then)
+        sweep = self._sweep
+        return sweep.bound_m(difference(q, measured)) < sweep.bound_m(difference(before, measured))
 
-    def _check_step(self, q_rad: Vec6, before_rad: Vec6, step: list[float]) -> Refusal | None:
-        fastest = max(max(step), -min(step))
-        moved_m = self._sweep.bound_m(step)
-        share = fastest * self._stretch + self._lead
-        self._room_m -= moved_m
-        self._fence_m -= moved_m
-        self._range_rad -= fastest
-        if self._fence_m <= moved_m * share or self._range_rad <= fastest * share:
-            refusal = self._check_limits(q_rad, _along(q_rad, step, share))
+    def _check_step(self, q_rad: Vec6, before_rad: Vec6, from_rad: Vec6) -> Refusal | None:
+        """Look at the stop of a command that is as fast as if it came from some joints in one tick."""
+        sweep, known = self._sweep, (self._room_m, self._fence_m, self._range_rad)
+        known, is_limit_near, rest, is_body_near, end, ahead_m = _looked_ahead(
+            q_rad, from_rad, known, sweep.far_m, sweep.links_m, self._law
+        )
+        self._room_m, self._fence_m, self._range_rad = known
+        if is_limit_near:
+            refusal = self._check_limits(q_rad, rest)
             if refusal is not None:
                 return refusal
-        share = fastest * self._stretch * self._weaker + self._lead
-        ahead_m = moved_m * share
-        if self._room_m > ahead_m:
+        if not is_body_near:
             return None
-        end = _along(q_rad, step, share)
         least_m = self._clearance.gap(end)
         self._room_m = least_m - ahead_m
         if self._room_m > 0.0:
@@ -110,7 +157,7 @@ class StopCheck:
         """Look at where the arm comes to rest, and take note of how far inside its limits the command is."""
         limits = self._limits
         low_rad, high_rad = limits.q_min_rad, limits.q_max_rad
-        if not (all(map(le, low_rad, end)) and all(map(le, end, high_rad))):
+        if not _range_room(end, low_rad, high_rad) >= 0.0:
             return Refusal(
                 Reason.STOP_RANGE, f"expected a stop within the joints' ranges, it would end at {_round(end)}"
             )
@@ -123,17 +170,15 @@ class StopCheck:
             )
             return Refusal(Reason.STOP_WORKSPACE, detail, -inside_m - OVERRUN_M)
         self._fence_m = self._inside(q)[0]
-        self._range_rad = min([min(x - a, b - x) for a, x, b in zip(low_rad, q, high_rad, strict=True)])
+        self._range_rad = _range_room(q, low_rad, high_rad)
         return None
 
     def _inside(self, q: Vec6) -> tuple[float, Vec3, float]:
         """Return how far inside its fences the tool is, where it is, and how high its lowest fingertip."""
-        (x0, y0, z0), (x1, y1, z1) = self._limits.workspace_m
-        (tcp, _, _), down = self._chain.points(q)
-        lowest_m = self._chain.lowest_m(tcp, down)
-        x, y, z = tcp
-        inside_m = min(x - x0, x1 - x, y - y0, y1 - y, z - z0, z1 - z, lowest_m - self._limits.tip_min_m)
-        return inside_m, tcp, lowest_m
+        limits, chain = self._limits, self._chain
+        (tcp, _, _), down = chain.points(q)
+        lowest_m = chain.lowest_m(tcp, down)
+        return _fence_room(tcp, lowest_m, limits.workspace_m, limits.tip_min_m), tcp, lowest_m
 
     def _check_way(self, q: Vec6, end: Vec6, end_gap_m: float, length_m: float, before: Vec6) -> Refusal | None:
         """Look closely: at the command and then between, until bounds meet. What is too near already may part."""
@@ -150,7 +195,7 @@ class StopCheck:
             if least_m < floor_m:
                 return self._too_near(a if gap_a < gap_b else b, least_m)
             if gap_a + gap_b - long_m < 2.0 * floor_m and long_m > FINE_M:
-                middle = _between(a, b)
+                middle = between(a, b, 0.5)
                 gap_m = gap(middle)
                 spans += [(a, gap_a, middle, gap_m, long_m / 2.0), (middle, gap_m, b, gap_b, long_m / 2.0)]
         return None
@@ -161,16 +206,6 @@ class StopCheck:
         what = "bodies apart" if who is None else f"{who.part} clear of {who.other}"
         detail = f"expected {what} on the way to a stop, it would be {-gap_m:.4f} m too near"
         return Refusal(Reason.CLEARANCE, detail, -gap_m)
-
-
-def _along(q: Vec6, step: list[float], share: float) -> Vec6:
-    a, b, c, d, e, f = [x + share * s for x, s in zip(q, step, strict=True)]
-    return a, b, c, d, e, f
-
-
-def _between(a: Vec6, b: Vec6) -> Vec6:
-    x = [(u + v) / 2.0 for u, v in zip(a, b, strict=True)]
-    return x[0], x[1], x[2], x[3], x[4], x[5]
 
 
 def _round(values: tuple[float, ...]) -> tuple[float, ...]:

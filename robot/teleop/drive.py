@@ -1,5 +1,6 @@
 """One drive from its options to its end: what is made, in which order, and how it is all given back. The edge."""
 
+import signal
 from contextlib import ExitStack
 from time import monotonic_ns
 
@@ -14,9 +15,9 @@ from robot.local_station import LocalStation
 from robot.messages import StationMode, StationState
 from robot.person import PersonOperator, TerminalPerson
 from robot.rigs import build_operator, build_shadow, build_station, build_view
+from robot.stop_request import StopRequest
 from robot.teleop.device import open_device
 from robot.teleop.driver import DriveEnd, Driver, DriveView, Pace, Unpaced
-from robot.teleop.interrupt import EndRequest
 from robot.teleop.jog import Jog, JogLimits
 from robot.teleop.pace import WallPace
 from robot.teleop.preview import AheadPreview
@@ -31,6 +32,8 @@ FULL_M_S, FULL_RAD_S = 0.25, 0.8
 RAMP_S = 0.25
 AHEAD_S = 0.2
 """How far a preview is ahead of the arm: longer than it takes to come to rest from full speed."""
+END_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+"""Ctrl-C, a polite kill, and a terminal or an SSH connection that went away; only Ctrl-C twice ends at once."""
 LEASE_NS = 1_000_000_000
 """A drive loop that did not come round for so long is gone: the arm is disarmed."""
 
@@ -66,7 +69,7 @@ def run_drive(options: DriveOptions) -> None:
     device = open_device(options.device, now_ns=pace.now_ns, step_s=STEP_S)
     console = Console(stderr=True)
     with ExitStack() as stack:
-        end = stack.enter_context(EndRequest())
+        end = stack.enter_context(StopRequest(signals=END_SIGNALS, at_once=(signal.SIGINT,)))
         station = stack.enter_context(build_station(resolved, is_driven=True))
         station.take_lease(f"teleop by {device.name}", life_ns=None if options.is_script else LEASE_NS)
         _arm(station, resolved, seed=options.seed)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from config.loader import resolve
 from config.resolved import Resolved
-from robot.kinematics import ToolChain
+from robot.chain import ToolChain
 from robot.messages import Vec6
 from robot.operated import OperatedStation
 from robot.rigs import build_operator, build_station

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from config.loader import resolve
+from robot.chain import ToolChain
 from robot.errors import RobotError, StaleStateError
-from robot.kinematics import ToolChain
 from robot.messages import ArmCommand, GripCommand
 from robot.rigs import build_plant
 from robot.servo import lag_s

@@ -1,14 +1,12 @@
 """What is shown while a run goes on, and how it is asked to stop."""
 
 import io
-import signal
 
 import pytest
 from rich.console import Console
 
 from learning.agent import EpochRecord
 from learning.progress import Progress, Rate, Status, duration_text
-from learning.stop_request import StopRequest
 from learning.stopwatch import Stopwatch
 from tests.learning.test_metrics import row
 
@@ -102,20 +100,6 @@ def test_a_stopwatch_books_time_to_the_layer_that_has_just_ended():
         watch.lap("stack")
         clock.now_s += 1.0
     assert watch.seconds_by_layer == {"experts": 1.5, "stack": 2.0, "evaluation": 5.0}
-
-
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_the_first_signal_asks_for_a_stop_and_the_second_stops_at_once(number):
-    said = []
-    before = signal.getsignal(number)
-    with StopRequest(said.append) as stop:
-        assert not stop()
-        signal.raise_signal(number)
-        assert stop()
-        with pytest.raises(KeyboardInterrupt):
-            signal.raise_signal(number)
-    assert len(said) == 1
-    assert signal.getsignal(number) is before
 
 
 @pytest.mark.parametrize("terminal", [True, False])

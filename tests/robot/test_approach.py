@@ -9,7 +9,7 @@ from msgspec.structs import replace
 
 from config.loader import resolve
 from robot.kinematics import Kinematics, UnreachableError
-from robot.motion.approach import Approach, Wall, singular_room, yielding
+from robot.motion.approach import Approach, Wall, links_of, singular_room, yielding
 from robot.safety import Braking, Clearance, Hard
 
 RESOLVED = resolve()
@@ -64,14 +64,14 @@ def test_half_the_room_passes_and_the_next_float_does_not(room, is_changed):
     ],
 )
 def test_elbow_and_wrist_have_no_room_at_their_singularities(q, which):
-    assert singular_room(ARM, q)[which] == pytest.approx(0.0, abs=1e-12)
+    assert singular_room(links_of(ARM), q)[which] == pytest.approx(0.0, abs=1e-12)
 
 
 @given(q=st.tuples(*[angles] * 6))
 def test_the_three_rooms_make_the_determinant_of_the_tool_s_jacobian(q):
     import numpy as np
 
-    elbow, wrist, shoulder = singular_room(ARM, q)
+    elbow, wrist, shoulder = singular_room(links_of(ARM), q)
     J = CLEARANCE.tool_jacobian(q)
     links = abs(ARM.joints[1].a_m * ARM.joints[2].a_m)
     assert abs(np.linalg.det(J)) == pytest.approx(links * elbow * wrist * shoulder, abs=1e-9)
@@ -112,7 +112,7 @@ def test_an_arm_is_not_stretched_flat_and_comes_back_at_full_speed(direction):
         now = _joints_at(at, now)
         names.add(because)
     assert "singularity" in names
-    assert singular_room(ARM, now)[0] >= 0.3 - 2e-3
+    assert singular_room(links_of(ARM), now)[0] >= 0.3 - 2e-3
     back = tuple(x - 0.02 * d / long for x, d in zip(at, direction, strict=True))
     assert approach.clear_place(at, back, now_rad=now, joints_at=_joints_at) == (back, None)
 

@@ -7,7 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from config.loader import load_arm
-from robot.kinematics import Kinematics, ToolChain
+from robot.chain import ToolChain
+from robot.kinematics import Kinematics
 from robot.messages import ArmMode, ArmSpec, GripCommand, Heading, Hold, JointTarget, Twist
 from robot.safety import GateLimits, Reason
 from robot.safety.checks import (
@@ -218,14 +219,20 @@ def test_upright_fingertips_pass_at_the_clearance_and_not_a_tenth_of_a_millimetr
         assert reason(check_tool(*CHAIN.tcp_and_lowest(q), LIMITS)) is expected
 
 
+def tip_height(q):
+    """Height of the point between the fingertips."""
+    (tcp, _, _), down = CHAIN.points(q)
+    return tcp[2] - down * ARM.tool.tip_below_tcp_m
+
+
 def test_a_tilted_tool_keeps_its_lower_finger_clear_too():
     def tilted_over(z):
         q = KINEMATICS.solve((0.44, 0.0, z), HOME)
         return with_joint(q, 4, q[4] + 0.35)
 
-    z = 0.05 - (CHAIN.tcp_and_tip(tilted_over(0.05))[1][2] - LIMITS.tip_min_m - 0.005)
+    z = 0.05 - (tip_height(tilted_over(0.05)) - LIMITS.tip_min_m - 0.005)
     q = tilted_over(z)
-    assert CHAIN.tcp_and_tip(q)[1][2] == pytest.approx(LIMITS.tip_min_m + 0.005, abs=1e-3)
+    assert tip_height(q) == pytest.approx(LIMITS.tip_min_m + 0.005, abs=1e-3)
     assert reason(check_tool(*CHAIN.tcp_and_lowest(q), LIMITS)) is Reason.TABLE
     assert check_tool(*CHAIN.tcp_and_lowest(tilted_over(z + 0.05)), LIMITS) is None
 
@@ -240,7 +247,7 @@ def test_whatever_passes_is_inside(q):
         assert x0 <= x <= x1
         assert y0 <= y <= y1
         assert z0 <= z <= z1
-        assert CHAIN.tcp_and_tip(q)[1][2] >= ARM.motion.table_clearance_m
+        assert tip_height(q) >= ARM.motion.table_clearance_m
 
 
 ANYTHING = st.one_of(st.floats(), st.integers(), st.none(), st.text(max_size=3), st.booleans())

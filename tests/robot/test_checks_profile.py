@@ -9,10 +9,10 @@ from msgspec.structs import replace
 
 from config.limits import ArmPart, Fence, KeepOut, Plane
 from config.posture import part_points, tilt_rad
+from robot.chain import ToolChain
 from robot.envelope import BoxGap, KeepOutGap, PlaneGap, braking_step, soft_step
 from robot.errors import RobotConfigError
 from robot.hal.fake import FakeArm
-from robot.kinematics import ToolChain
 from robot.safety import Gate, GateLimits, Reason, check_profile_fits
 from robot.safety.checks_profile import (
     check_cone,

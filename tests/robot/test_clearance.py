@@ -86,7 +86,7 @@ def test_the_slope_of_a_gap_is_its_difference(clearance):
 
 
 def test_the_tool_jacobian_is_the_difference_of_the_tool_s_place(clearance):
-    from robot.kinematics import ToolChain
+    from robot.chain import ToolChain
 
     chain, h, q = ToolChain(ARM), 1e-6, ARM.home_rad
     J = clearance.tool_jacobian(q)
@@ -140,7 +140,7 @@ def test_nothing_of_the_arm_moves_farther_than_the_sweep_s_bound(shapes):
         if rng.random() < 0.5:
             turn[3] = -turn[1] - turn[2]  # a tool that is kept pointing down
         moved = np.linalg.norm(points(q + turn) - points(q), axis=1).max()
-        assert moved <= sweep.bound_m(turn.tolist()) + 1e-12
+        assert moved <= sweep.bound_m(tuple(turn.tolist())) + 1e-12
 
 
 def test_an_arm_without_parallel_axes_has_a_bound_too():
@@ -149,5 +149,5 @@ def test_an_arm_without_parallel_axes_has_a_bound_too():
     rows = list(ARM.joints)
     rows[1] = msgspec.structs.replace(rows[1], alpha_rad=0.1)
     skew = Sweep(msgspec.structs.replace(ARM, joints=tuple(rows)))
-    turn = [0.01, -0.02, 0.03, 0.0, 0.01, 0.02]
+    turn = (0.01, -0.02, 0.03, 0.0, 0.01, 0.02)
     assert skew.bound_m(turn) >= Sweep(ARM).bound_m(turn)

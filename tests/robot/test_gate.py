@@ -8,10 +8,11 @@ from msgspec.structs import replace
 from config.limited import limited
 from config.limits import Plane, Workspace
 from config.loader import load_arm
+from robot.chain import ToolChain
 from robot.envelope import Envelope
 from robot.errors import RobotConfigError
 from robot.hal.fake import FakeArm
-from robot.kinematics import Kinematics, ToolChain
+from robot.kinematics import Kinematics
 from robot.messages import ArmMode, GripCommand, Heading, Outcome
 from robot.safety import Gate, GateLimits, Reason
 from tests.support.profiles import envelope, open_envelope, profile

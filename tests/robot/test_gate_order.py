@@ -7,8 +7,9 @@ from msgspec.structs import replace
 
 from config.limits import Plane
 from config.loader import load_arm
+from robot.chain import ToolChain
 from robot.hal.fake import FakeArm
-from robot.kinematics import Kinematics, ToolChain
+from robot.kinematics import Kinematics
 from robot.messages import ArmMode, GripCommand, Heading, Outcome, Verdict
 from robot.safety import Gate, GateLimits, Reason, Refusal
 from tests.support.profiles import envelope, fenced, open_envelope, profile

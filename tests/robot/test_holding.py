@@ -6,8 +6,9 @@ from msgspec.structs import replace
 
 from config.limited import limited
 from config.limits import ArmPart, Fence, KeepOut, Plane, Workspace
+from robot.chain import ToolChain
 from robot.hal.fake import FakeArm
-from robot.kinematics import Kinematics, ToolChain
+from robot.kinematics import Kinematics
 from robot.messages import Hold, JointTarget, Twist
 from robot.motion import Mover
 from robot.safety import Gate, GateLimits

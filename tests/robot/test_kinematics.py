@@ -8,9 +8,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from config.loader import load_arm
+from robot.chain import ToolChain
 from robot.description import arm_model, forward_kinematics, tool_down
 from robot.downward import DownwardArm
-from robot.kinematics import Kinematics, ToolChain, UnreachableError
+from robot.kinematics import Kinematics, UnreachableError
 
 ARM = load_arm("ur5e")
 KINEMATICS = Kinematics(ARM)
@@ -41,9 +42,10 @@ def ur_table(q):
 def test_the_fast_chain_is_the_published_table_to_a_micrometre(q):
     T = ur_table(q)
     assert np.allclose(CHAIN.tcp(q), T[:3, 3], atol=1e-6)
-    tcp, tip = CHAIN.tcp_and_tip(q)
+    (tcp, flange, _), down = CHAIN.points(q)
     assert np.allclose(tcp, T[:3, 3], atol=1e-6)
-    assert np.allclose(tip, T[:3, 3] + ARM.tool.tip_below_tcp_m * T[:3, 2], atol=1e-6)
+    assert np.allclose(flange, T[:3, 3] - ARM.tool.tcp_m[2] * T[:3, 2], atol=1e-6)
+    assert down == pytest.approx(-T[2, 2], abs=1e-6)
 
 
 @given(JOINTS)
@@ -62,19 +64,6 @@ def test_placo_agrees_with_the_chain(q):
     robot.state.q[lo : lo + 6] = q
     robot.update_kinematics()
     assert np.allclose(robot.get_T_world_frame("tcp")[:3, 3], CHAIN.tcp(q), atol=1e-6)
-
-
-@given(JOINTS)
-def test_the_rows_multiplied_out_are_the_rows_one_by_one(q):
-    """Two ways to the same points: one for arms of the family whose tool lies on its axis, one for any."""
-    beside = ToolChain(
-        msgspec.structs.replace(ARM, tool=msgspec.structs.replace(ARM.tool, tcp_m=(1e-300, 0.0, 0.1628)))
-    )
-    assert ARM.tool.tcp_m == (0.0, 0.0, 0.1628)
-    (plain, plain_down), (rows, rows_down) = CHAIN.points(q), beside.points(q)
-    assert np.allclose(plain, rows, rtol=0.0, atol=1e-12)
-    assert plain_down == pytest.approx(rows_down, abs=1e-12)
-    assert CHAIN.tcp(q) == pytest.approx(plain[0], abs=1e-12)
 
 
 @given(JOINTS)

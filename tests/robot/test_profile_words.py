@@ -6,9 +6,10 @@ import pytest
 from msgspec.structs import replace
 
 from config.loader import resolve
+from robot.chain import ToolChain
 from robot.envelope import JointEnd, PlaneGap
 from robot.hal.fake import FakeArm
-from robot.kinematics import Kinematics, ToolChain
+from robot.kinematics import Kinematics
 from robot.safety import Braking, GateLimits, Reason, Refusal, StopCheck
 from robot.safety.checks_profile import (
     check_cone,

@@ -200,5 +200,5 @@ def test_a_tool_on_the_edge_of_the_workspace_passes_and_the_next_float_does_not(
     ],
 )
 def test_joints_of_another_number_are_an_error_and_never_cut_short(check):
-    with pytest.raises(ValueError, match="zip"):
+    with pytest.raises((TypeError, IndexError), match=r"matching|range"):
         check(REST[:5])

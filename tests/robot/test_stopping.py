@@ -107,10 +107,10 @@ def test_without_parallel_axes_every_turn_reaches_as_far_as_what_comes_after(fir
     sweep = Sweep(bent(first=first, second=second))
     rows = [math.hypot(0.1 * k, 0.05 * k) for k in range(1, 7)]
     for i in range(5):
-        turn = [-0.5 if k == i else 0.0 for k in range(6)]
+        turn = tuple(-0.5 if k == i else 0.0 for k in range(6))
         assert sweep.bound_m(turn) == pytest.approx(0.5 * (0.1 * (i + 1) + sum(rows[i + 1 :]) + TIP))
-    assert sweep.bound_m([0.0] * 5 + [0.5]) == pytest.approx(0.5 * math.hypot(0.6, THICK))
-    assert sweep.bound_m([0.0] * 5 + [-0.5]) == pytest.approx(0.5 * math.hypot(0.6, THICK))
+    assert sweep.bound_m(vec(f=0.5)) == pytest.approx(0.5 * math.hypot(0.6, THICK))
+    assert sweep.bound_m(vec(f=-0.5)) == pytest.approx(0.5 * math.hypot(0.6, THICK))
 
 
 @pytest.mark.parametrize(
@@ -129,7 +129,7 @@ def test_what_is_farthest_aside_is_a_link_the_palm_or_the_open_fingers(radius_m,
 
 def test_links_behind_the_base_may_lie_on_either_side_of_it():
     rows = [replace(row, a_m=abs(row.a_m)) for row in ARM.joints]
-    assert Sweep(replace(ARM, joints=tuple(rows))).bound_m([0.1] * 6) == Sweep(ARM).bound_m([0.1] * 6)
+    assert Sweep(replace(ARM, joints=tuple(rows))).bound_m((0.1,) * 6) == Sweep(ARM).bound_m((0.1,) * 6)
 
 
 def test_an_offset_of_the_base_itself_reaches_out_too():
@@ -138,5 +138,5 @@ def test_an_offset_of_the_base_itself_reaches_out_too():
 
 
 def test_turns_of_another_number_are_an_error():
-    with pytest.raises(ValueError, match="unpack"):
-        Sweep(ARM).bound_m([0.1] * 5)
+    with pytest.raises((TypeError, ValueError), match=r"matching|unpack"):
+        Sweep(ARM).bound_m((0.1,) * 5)

@@ -9,10 +9,10 @@ import msgspec
 import pytest
 
 from config.loader import load_arm
+from robot.chain import ToolChain
 from robot.errors import RobotConfigError, WireError
 from robot.hal.ur_checks import check_facts, check_pose, flange_pose
 from robot.hal.ur_primary import PRIMARY_PORT, ArmFacts, parse_facts, parse_greeting, read_facts
-from robot.kinematics import ToolChain
 from sim_twin.controller.wire.primary import pack_state
 from sim_twin.controller.wire.primary_messages import pack_text, pack_version
 from sim_twin.controller.wire.primary_state import (

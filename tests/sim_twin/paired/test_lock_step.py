@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from config.loader import resolve
-from robot.kinematics import ToolChain
+from robot.chain import ToolChain
 from robot.operated import OperatedStation
 from robot.rigs import build_operator, build_station
 from sim_twin.paired import Kind, Track, compare, drive_errand

@@ -7,7 +7,7 @@ import msgspec
 import numpy as np
 import pytest
 
-from robot.kinematics import ToolChain
+from robot.chain import ToolChain
 from robot.messages import Heading
 from robot.operated import OperatedStation
 from robot.rigs import build_operator, build_station

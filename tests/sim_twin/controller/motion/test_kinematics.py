@@ -4,8 +4,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from config.loader import resolve
+from robot.chain import ToolChain
 from robot.description import forward_kinematics
-from robot.kinematics import ToolChain
 from sim_twin.controller.motion.kinematics import (
     ArmKinematics,
     DhRow,
