@@ -170,6 +170,9 @@ def _check_joints(profile: Profile, where: str, checker: Checker) -> None:
             f"less than {half:g}, half the joint's range",
             f"{joint.soft_margin_rad:g}",
         )
+        for own, stop in (("acceleration_rad_s2", "stop_acceleration_rad_s2"), ("jerk_rad_s3", "stop_jerk_rad_s3")):
+            least, most = getattr(joint, own), getattr(joint, stop)
+            checker.need(least <= most, f"{where}.joints[{i}].{stop}", f"at least {own} = {least:g}", f"{most:g}")
 
 
 def _check_workspace(profile: Profile, where: str, checker: Checker) -> None:

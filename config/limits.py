@@ -61,8 +61,13 @@ class JointLimit(Section, frozen=True, kw_only=True):
     """So near an end the joint goes slower towards it the nearer it is; away from it as fast as anywhere."""
     speed_rad_s: Annotated[float, Meta(gt=0.0, le=10.0)]
     acceleration_rad_s2: Annotated[float, Meta(gt=0.0, le=1000.0)]
-    """Greatest change of the commanded speed; braking and giving way to a push may be as hard as they will."""
+    """Greatest gain of the commanded speed. What gives way to a push is not held to it."""
     jerk_rad_s3: Annotated[float, Meta(gt=0.0, le=10_000.0)]
+    """Greatest change of that gain while it grows."""
+    stop_acceleration_rad_s2: Annotated[float, Meta(gt=0.0, le=1000.0)]
+    """Greatest change of the commanded speed for whatever reason: a limit ahead, a turn."""
+    stop_jerk_rad_s3: Annotated[float, Meta(gt=0.0, le=100_000.0)]
+    """Greatest change of that."""
 
 
 class Speeds(Section, frozen=True, kw_only=True):

@@ -108,8 +108,14 @@ class JointEnd(msgspec.Struct, frozen=True):
     margin_rad: float
     step_rad: float
     """Greatest change of its command in one tick."""
-    braking_rad: float
-    """Greatest change of that change, by its acceleration."""
+    gain_rad: float
+    """Greatest gain of that change from tick to tick, by its acceleration."""
+    jerk_rad: float
+    """Greatest change of that gain while it grows, by its jerk."""
+    stop_rad: float
+    """Greatest change of that change for whatever reason, by the acceleration of a stop."""
+    stop_jerk_rad: float
+    """Greatest change of that, by the jerk of a stop."""
 
 
 class Envelope(msgspec.Struct, frozen=True, kw_only=True):
@@ -126,6 +132,10 @@ class Envelope(msgspec.Struct, frozen=True, kw_only=True):
     """Nearer to straight down than this, no tilt of a tick's length matters."""
     fence_braking_m: float
     """Change of the way per tick, from tick to tick, that is counted on ahead of a fence."""
+    onset: float
+    """Ticks that it takes at the most until a joint that gathered speed as it may brakes as it may, halved."""
+    overshoot: float
+    """A part that gathers speed goes on by its gain of a tick times this while its joints' jerk ends the gain."""
     fence_far_m: float
     """From a gap this wide no part needs to slow down, however fast it goes."""
 
@@ -147,10 +157,14 @@ class Envelope(msgspec.Struct, frozen=True, kw_only=True):
                 joint.range_rad[1],
                 limit.soft_margin_rad,
                 joint.speed_rad_s * tick_s,
-                limit.acceleration_rad_s2 * tick_s * tick_s,
+                limit.acceleration_rad_s2 * tick_s**2,
+                limit.jerk_rad_s3 * tick_s**3,
+                limit.stop_acceleration_rad_s2 * tick_s**2,
+                limit.stop_jerk_rad_s3 * tick_s**3,
             )
             for joint, limit in zip(arm.joints, profile.joints, strict=True)
         )
+        onset = max([(j.gain_rad + j.stop_rad) / (2.0 * j.stop_jerk_rad) for j in joints])
         fences = [BoxGap(f.name, PARTS.index(part), f.low_m, f.high_m) for f in space.boxes for part in f.parts]
         planes = [_plane(plane, part) for plane in space.planes for part in plane.parts]
         outs = [_keep_out(out, part) for out in space.keep_outs for part in out.parts]
@@ -163,21 +177,27 @@ class Envelope(msgspec.Struct, frozen=True, kw_only=True):
             cone_cosine=math.cos(space.tool_cone_rad),
             cone_near_cosine=math.cos(max(0.0, space.tool_cone_rad - CONE_NEAR_RAD)),
             fence_braking_m=braking,
-            fence_far_m=FAR_M + fastest * fastest / (2.0 * profile.stopping.deceleration_m_s2),
+            onset=onset,
+            overshoot=max([0.0, *((j.gain_rad / j.stop_jerk_rad - 1.0) / 2.0 for j in joints)]),
+            fence_far_m=FAR_M
+            + onset * tick_s * fastest
+            + fastest * fastest / (2.0 * profile.stopping.deceleration_m_s2),
         )
 
 
-def braking_step(gap: float, braking: float) -> float:
+def braking_step(gap: float, braking: float, onset: float = 0.0) -> float:
     """Return the longest step of one tick after which what is left of a gap still suffices to come to rest in.
 
-    A step s leaves gap - s, and from s the steps fall by `braking` a tick: s^2 <= 2 braking (gap - s), the law
-    v^2 <= 2 a d at the end of the tick.
+    A step s leaves gap - s, is gone on with for the onset n, and then the steps fall by `braking` a tick:
+    s^2 <= 2 braking (gap - (1 + n) s), the law v^2 <= 2 a d at the end of the tick.
 
     Args:
         gap: what is left before the step; 0 or less allows none.
         braking: a t^2, greatest change of a step from tick to tick.
+        onset: ticks that it takes until braking is as good as begun, by its jerk.
     """
-    return math.sqrt(braking * braking + 2.0 * braking * gap) - braking if gap > 0.0 else 0.0
+    lost = (1.0 + onset) * braking
+    return math.sqrt(lost * lost + 2.0 * braking * gap) - lost if gap > 0.0 else 0.0
 
 
 def soft_step(gap: float, margin: float, step: float) -> float:

@@ -81,11 +81,12 @@ class Monitor:
         )
         speed = np.abs(course.qd_rad_s)
         yield Margin("joint_speed", 1.0 - speed / [j.speed_rad_s for j in joints], speed, course.physics_s)
-        rate = _accelerations(course)
+        rate, is_gain = _accelerations(course)
         if len(rate):
-            yield Margin(
-                "joint_acceleration", 1.0 - rate / [j.acceleration_rad_s2 for j in joints], rate, course.physics_s
+            most = np.where(
+                is_gain, [j.acceleration_rad_s2 for j in joints], [j.stop_acceleration_rad_s2 for j in joints]
             )
+            yield Margin("joint_acceleration", 1.0 - rate / most, rate, course.physics_s)
 
     def _set_points(self, course: Course) -> Iterator[Margin]:
         """Read what reached the drives: its differences over ticks, exact where the joints themselves lag and swing.
@@ -95,17 +96,22 @@ class Monitor:
         """
         joints, tick_s = self._profile.joints, course.physics_s * course.n_substeps
         odd = _near(course, course.stopping | _pressed(course))[:: course.n_substeps][: len(course.set_point_rad)]
-        rate = course.set_point_rad
-        for name, most in (
-            ("command_speed", [j.speed_rad_s for j in joints]),
-            ("command_acceleration", [j.acceleration_rad_s2 for j in joints]),
-            ("command_jerk", [j.jerk_rad_s3 for j in joints]),
+        if len(course.set_point_rad) < 2:
+            return
+        speed = np.diff(course.set_point_rad, axis=0) / tick_s
+        rate = np.diff(speed, axis=0) / tick_s
+        jerk = np.diff(rate, axis=0) / tick_s
+        for name, came, most in (
+            ("command_speed", np.abs(speed), [j.speed_rad_s for j in joints]),
+            ("command_acceleration", _gained(speed) / tick_s, [j.acceleration_rad_s2 for j in joints]),
+            ("command_stop_acceleration", np.abs(rate), [j.stop_acceleration_rad_s2 for j in joints]),
+            ("command_jerk", _grown(speed, rate) / tick_s, [j.jerk_rad_s3 for j in joints]),
+            ("command_stop_jerk", np.abs(jerk), [j.stop_jerk_rad_s3 for j in joints]),
         ):
-            if len(rate) < 2:
-                return
-            rate = np.diff(rate, axis=0) / tick_s
-            came = np.where(odd[len(odd) - len(rate) :, None], 0.0, np.abs(rate))
-            yield Margin(name, 1.0 - came / most, came, tick_s)
+            if len(came) == 0:
+                continue
+            judged = np.where(odd[len(odd) - len(came) :, None], 0.0, came)
+            yield Margin(name, 1.0 - judged / most, judged, tick_s)
         moved = self._pointed.speeds(course.set_point_rad, tick_s)
         moved = np.where(odd[len(odd) - len(moved) :, None], 0.0, moved)
         for i, (name, most) in enumerate(_point_speeds(self._profile)):
@@ -186,7 +192,30 @@ def _outside(keep: KeepOut, at: Array) -> Array:
     return np.linalg.norm(np.maximum(past, 0.0), axis=1) + np.minimum(past.max(axis=1), 0.0) - keep.radius_m
 
 
-def _accelerations(course: Course) -> Array:
+def _gained(speed: Array) -> Array:
+    """Return by how much each speed grew on the one before, after a turn all of it.  (n, 6) -> (n-1, 6)"""
+    is_on = speed[1:] * speed[:-1] > 0.0
+    return np.maximum(np.abs(speed[1:]) - np.where(is_on, np.abs(speed[:-1]), 0.0), 0.0)
+
+
+def _grown(speed: Array, rate: Array) -> Array:
+    """Return by how much each rate grew on the one before where a joint gathers speed without having turned.
+
+    What let go of a brake counts from where it gathers speed again; 0 elsewhere.
+
+    Args:
+        speed: (n, 6)
+        rate: (n-1, 6) from one speed to the next.
+
+    Returns:
+        (n-2, 6)
+    """
+    way = np.sign(rate[1:])
+    is_on = (speed[2:] * way > 0.0) & (speed[1:-1] * way >= 0.0)
+    return np.where(is_on, np.maximum((rate[1:] - way * np.maximum(rate[:-1] * way, 0.0)) * way, 0.0), 0.0)
+
+
+def _accelerations(course: Course) -> tuple[Array, NDArray[np.bool_]]:
     """Return the change of speed over one tick of commands, per second, where nothing but the servo moves the arm.
 
     Set-points come once a tick and the servo follows each in a few steps of physics, so that the instant's acceleration
@@ -194,13 +223,14 @@ def _accelerations(course: Course) -> Array:
     hold: forces, and distance and time of a stop.
 
     Returns:
-        (n, 6), zero where it is not judged.
+        (n, 6), zero where it is not judged, and whether speed was gained by it.
     """
     n = course.n_substeps
     if course.n_steps <= n:
-        return np.empty((0, 6))
-    rate = np.abs(course.qd_rad_s[n:] - course.qd_rad_s[:-n]) / (n * course.physics_s)
-    return np.where(_near(course, course.stopping | _pressed(course))[n:, None], 0.0, rate)
+        return np.empty((0, 6)), np.empty((0, 6), dtype=bool)
+    now, then = course.qd_rad_s[n:], course.qd_rad_s[:-n]
+    rate = np.abs(now - then) / (n * course.physics_s)
+    return np.where(_near(course, course.stopping | _pressed(course))[n:, None], 0.0, rate), now * (now - then) > 0.0
 
 
 def _pressed(course: Course) -> NDArray[np.bool_]:

@@ -2,23 +2,28 @@
 
 import math
 from itertools import pairwise
+from operator import le
 
 from config.arm import ArmConfig
 from robot.envelope import Envelope
 from robot.geometry import turn_about_vertical, unwound
 from robot.kinematics import Kinematics, UnreachableError
 from robot.messages import Vec3, Vec6
-from robot.motion.holding import share_of_step, slid
+from robot.motion.holding import Met, brake_share, share_of_way, slid, stretch, too_fast
 from robot.motion.limiter import AxisLimits, Limiter
+from robot.motion.pacing import braked, part_way, window
 
 __all__ = ["Follower"]
 
 SPEED_SHARE = 0.95
 """Share of a joint's greatest speed that motion uses, so that the gate's limit is never met by rounding."""
-RATE_SHARE = 0.9
-"""Likewise of joints' acceleration and jerk: what is held back for another reason goes on without a jolt."""
+RATE_SHARE = 0.97
+"""Likewise of joints' acceleration and jerk."""
 ALIGN_RAD = 0.01
-"""A tool tilted or turned by less than this points down as far as motion cares; the next tick sets it right."""
+"""A tool tilted or turned by less than this points down as far as motion cares; it is set right on the way."""
+LEAN_S = 0.15
+"""So long that takes: 0.01 rad in this time are 180 rad/s3 at the most, which leaves joints to what is asked."""
+LEAN_RAD = 1e-7
 SWIFT_TICK_S = 0.005
 """In shorter ticks than this, a real arm's and not the twin's, the way to a new target is found one tick after it was
 set: the tick in which an intent begins has enough to do."""
@@ -74,6 +79,7 @@ class Follower:
             tick_s=tick_s,
         )
         self._joint_step_rad = tuple(SPEED_SHARE * j.speed_rad_s * tick_s for j in joints)
+        self._lean_share = tick_s / LEAN_S
         self.seed(arm.home_rad)
 
     def seed(self, q_rad: Vec6) -> None:
@@ -83,10 +89,13 @@ class Follower:
         self.held: tuple[str, float] | None = None
         self._is_fenced = False
         self._points = self._kinematics.chain.points(q_rad)
+        self._points_before = self._points[0]
         self.target_m = self._kinematics.tcp(q_rad)
         self.yaw_rad = self._home_yaw_rad
         self._is_upright = self._is_solved = False
         self._to_come: list[float] | None = None
+        self._lean_rad: Vec6 | None = None
+        self._lean_at = 0.0
         self._joints.seed(list(q_rad))
         self._take_up_tool()
 
@@ -184,7 +193,7 @@ class Follower:
         """Advance by one tick and return the joints to command."""
         self.trouble = self.held = None
         q = self._step_tool() if self._is_upright else _vec6(self._joints.step())
-        if q != self.q_rad:
+        if q != self.q_rad or q != self.q_before_rad:
             q = self._hold_back(q)
         if self._tool.is_failed or self._joints.is_failed:
             self.trouble = "brake"
@@ -196,19 +205,41 @@ class Follower:
             self._take_target(self._to_come)
         before = self._tool.at
         now = self._slide(before, self._tool.step())
-        if now == before and self._is_solved:
+        if now == before and self._is_solved and self._lean_rad is None:
             return self.q_rad  # at rest: solving again would stir the last digits
-        self._is_solved = True
-        x, y, z, yaw = now
-        ahead = _between(self.q_before_rad, self.q_rad, 2.0)
         try:
-            q = self._kinematics.solve((x, y, z), ahead, yaw_rad=yaw)
+            if not self._is_solved:
+                self._lean(before)
+            return self._upright(now)
         except UnreachableError:
             self._take_up_joints()
             self.brake()
             self.trouble = "unreachable"
             return _vec6(self._joints.step())
-        return q
+
+    def _upright(self, now: list[float]) -> Vec6:
+        """Return the joints for the tool's coordinates, by as much off upright as they still lean."""
+        x, y, z, yaw = now
+        lean = self._lean_rad
+        ahead = _between(self.q_before_rad, self.q_rad, 2.0)
+        q = self._kinematics.solve((x, y, z), ahead, yaw_rad=yaw)
+        if lean is None:
+            return q
+        self._lean_at += self._lean_share
+        t = self._lean_at
+        if t >= 1.0:
+            self._lean_rad = None
+            return q
+        left = 1.0 - t * t * t * (10.0 - 15.0 * t + 6.0 * t * t)
+        return _vec6([a + left * b for a, b in zip(q, lean, strict=True)])
+
+    def _lean(self, tool: list[float]) -> None:
+        """Take up by how much the joints are off those of an upright tool; that is set right as smoothly as may be."""
+        x, y, z, yaw = tool
+        q = self._kinematics.solve((x, y, z), self.q_rad, yaw_rad=yaw)
+        self._is_solved, self._lean_at = True, 0.0
+        lean = _vec6([a - b for a, b in zip(self.q_rad, q, strict=True)])
+        self._lean_rad = lean if max(max(lean), -min(lean)) > LEAN_RAD else None
 
     def _take_target(self, target: list[float]) -> None:
         if self._is_due:
@@ -224,39 +255,73 @@ class Follower:
             return now
         self.held = name, math.dist((sx, sy, sz), (x, y, z)) / math.dist((x, y, z), before[:3])
         self._is_fenced = True
-        dt, target, speed = self._tick_s, self._tool.target, self._tool.speed
-        speed = [speed[0] + (sx - x) / dt, speed[1] + (sy - y) / dt, speed[2] + (sz - z) / dt, speed[3]]
-        self._tool.seed([sx, sy, sz, yaw], speed)
+        dt, target, speed, rate = self._tick_s, self._tool.target, self._tool.speed, self._tool.acceleration
+        ux, uy, uz = sx - x, sy - y, sz - z
+        speed = [speed[0] + ux / dt, speed[1] + uy / dt, speed[2] + uz / dt, speed[3]]
+        towards = min(0.0, rate[0] * ux + rate[1] * uy + rate[2] * uz) / (ux * ux + uy * uy + uz * uz)
+        rate = [rate[0] - towards * ux, rate[1] - towards * uy, rate[2] - towards * uz, rate[3]]
+        self._tool.seed([sx, sy, sz, yaw], speed, rate)
         self._tool.aim(target)
         return self._tool.at
 
     def _hold_back(self, q: Vec6) -> Vec6:
-        """Hold a step back where a joint or a part would be too fast for what is ahead; go on at the speed left."""
-        chain, now = self._kinematics.chain, self.q_rad
-        points = chain.points(q)
-        share, name = share_of_step(now, self.q_before_rad, q, self._points, points, self._envelope)
-        if self._is_upright:  # joint limiters keep to their own greatest speed
-            excess = max([abs(a - b) / most for a, b, most in zip(q, now, self._joint_step_rad, strict=True)])
-            if excess > 1.0 and 1.0 / excess <= share:
-                share, name = 1.0 / excess, "joint_speed"
-        if not name:
-            self._points = points
-            return q
-        self.held = name, 1.0 - share
-        self._is_fenced = self._is_fenced or name in self._fence_names
-        q = _between(now, q, share)
-        self._points = chain.points(q)
-        if self._is_upright:
-            target, tool = self._tool.target, self._tool
-            speed, rate = [v * share for v in tool.speed], [a * share for a in tool.acceleration]
-            yaw = turn_about_vertical(chain.quat(q))
-            self._tool.seed([*self._points[0][0], unwound(yaw, target[3])], speed, rate)
-            self._tool.aim(target)
-        else:
-            target = self._joints.target
-            self._joints.go_on(list(self.q_before_rad), list(now), list(q))
-            self._joints.aim(target)
+        """Hold a step back where joints would change their speeds too hard, or anything is too fast for what is ahead.
+
+        It is brought back towards the step of an arm that brakes; motion goes on from there.
+        """
+        chain, now, ends = self._kinematics.chain, self.q_rad, self._envelope.joints
+        within = window(now, self.q_before_rad, self._q_earlier_rad, ends)
+        wanted = [a - b for a, b in zip(q, now, strict=True)]
+        points, share, name, base = chain.points(q), 1.0, "", wanted
+        if not all(map(le, within.low, wanted)) or not all(map(le, wanted, within.high)):
+            base = braked(now, self.q_before_rad, self._q_earlier_rad, ends, within)
+            share, name = part_way(wanted, base, within.low, within.high), "joint_acceleration"
+        met = self._met(wanted, points)
+        if met:
+            if base is wanted:
+                base = braked(now, self.q_before_rad, self._q_earlier_rad, ends, within)
+            there = chain.points(_moved(now, base))
+            for limit in met:
+                left = share_of_way(limit, base, self._points, there, self._envelope)
+                if left < share:
+                    share, name = left, limit.name
+        if share < 1.0:
+            self.held = name, 1.0 - share
+            self._is_fenced = self._is_fenced or name in self._fence_names
+            q = _moved(now, [b + share * (w - b) for w, b in zip(wanted, base, strict=True)])
+            points = chain.points(q)
+            self._go_on(q, points[0][0])
+        self._points_before, self._points = self._points[0], points
         return q
+
+    def _met(self, steps: list[float], points: tuple[tuple[Vec3, Vec3, Vec3], float]) -> list[Met]:
+        """Return the limits that steps go at too fast. Joints' ways bend: where a stop would end is looked at too."""
+        now, envelope = self.q_rad, self._envelope
+        fastest = max(max(steps), -min(steps))
+        if fastest <= 0.0:
+            return []
+        lost = brake_share(fastest, envelope)
+        end = None
+        if not self._is_upright and envelope.fences:
+            end = self._kinematics.chain.points(_between(now, _moved(now, steps), stretch(lost, envelope)))[0]
+        places = (self._points_before, self._points, points)
+        return too_fast(now, steps, places, end, lost, envelope)
+
+    def _go_on(self, q: Vec6, tcp_m: Vec3) -> None:
+        """Let the limiter in charge go on from joints that are other than it said."""
+        now, before = self.q_rad, self.q_before_rad
+        if not self._is_upright:
+            target = self._joints.target
+            self._joints.go_on(list(before), list(now), list(q))
+            self._joints.aim(target)
+            return
+        tool, quat = self._tool, self._kinematics.chain.quat
+        target = tool.target
+        yaws = [unwound(turn_about_vertical(quat(at)), target[3]) for at in (before, now, q)]
+        places = (self._points_before[0], self._points[0][0], tcp_m)
+        tool.go_on(*([*place, yaw] for place, yaw in zip(places, yaws, strict=True)))
+        tool.aim(target)
+        self._is_solved = False
 
     def _take_up_tool(self) -> None:
         """Go on by the tool's coordinates, if it points down and the joints are at rest."""
@@ -270,7 +335,6 @@ class Follower:
         if abs(yaw - self._home_yaw_rad) < ALIGN_RAD:
             yaw = self._home_yaw_rad
         self._is_upright, self._to_come = True, None
-        self.q_before_rad = self._q_earlier_rad = self.q_rad
         self.target_m, self.yaw_rad = self._kinematics.tcp(self.q_rad), yaw
         self._tool.seed([*self.target_m, yaw])
         self._is_solved = False
@@ -292,6 +356,10 @@ class Follower:
         self.aim_joints(_between(now, q, min(1.0, ALIGN_STEP_RAD / largest)) if largest > 0.0 else q)
         self.yaw_rad = yaw_rad
         return True
+
+
+def _moved(q: Vec6, steps: list[float]) -> Vec6:
+    return _vec6([a + b for a, b in zip(q, steps, strict=True)])
 
 
 def _between(a: Vec6, b: Vec6, share: float) -> Vec6:

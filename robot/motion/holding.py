@@ -1,15 +1,29 @@
-"""How much of a step motion may take: held back ahead of every limit so that it can stop inside. Pure.
+"""Which limits a step of motion would meet too fast to stop inside, and how far it may go instead. Pure.
 
-Only what goes towards a limit is held back, continuously: what goes away from it keeps its full speed. Each limit says
-its name and by how much it held back, as a share of the step.
+Only what goes towards a limit is held back, continuously: what goes away from it keeps its full speed. A step is
+brought back towards the one of an arm that brakes, so that joints keep their accelerations and jerks (pacing), and
+braking is begun so early that it suffices. Each limit says its name and by how much it held back, as a share of it.
 """
 
 import math
+from collections.abc import Sequence
+
+import msgspec
 
 from robot.envelope import Envelope, braking_step, soft_step
 from robot.messages import Vec3, Vec6
 
-__all__ = ["MARGIN_M", "RESERVE", "Points", "share_of_giving_way", "share_of_step", "slid"]
+__all__ = [
+    "MARGIN_M",
+    "Met",
+    "Points",
+    "brake_share",
+    "share_of_giving_way",
+    "share_of_way",
+    "slid",
+    "stretch",
+    "too_fast",
+]
 
 MARGIN_M = 5e-4
 """Motion stops this far inside of a fence, so that the gate never meets one by rounding or by a path that bows."""
@@ -19,30 +33,92 @@ MARGIN_RAD = 1e-3
 RESERVE = 0.95
 """Share of a limit that motion uses, so that the gate's own is never met by rounding."""
 SPEED_RESERVE = 0.99
+JOINT_RESERVE = 0.96
+BRAKE_SHARE = 0.9
+"""Of what joints can brake by, so much is counted on ahead of a limit: the rest makes up for ways that bend."""
+NEAR_SPEED = 0.8
+"""From this share of a part's speed on it matters how fast it grows."""
 TILT_RAD_S2 = 5.0
 """Deceleration of the tool's tilt that is counted on ahead of its cone."""
 PART_NAMES = ("tcp_speed", "flange_speed", "elbow_speed")
+JOINT, PART, FENCE, CONE = range(4)
 
 Points = tuple[Vec3, Vec3, Vec3]
-Held = tuple[float, str]
+Place = tuple[Points, float]
+"""Points and the cosine of the tilt, as chain.ToolChain.points returns them."""
 
 
-def share_of_step(
-    now_rad: Vec6, last_rad: Vec6, q_rad: Vec6, now: tuple[Points, float], to: tuple[Points, float], envelope: Envelope
-) -> Held:
-    """Return how much of the step to joints may be taken, 0 to 1, and what holds it back.
+class Met(msgspec.Struct, frozen=True):
+    """A limit that a step would go at too fast."""
+
+    name: str
+    kind: int
+    index: int
+    """Which joint, part or fence."""
+    size: float
+    """How far the step goes towards it: metres, or radians, of a joint as its step is signed."""
+    most: float
+    """How far it may."""
+
+
+def brake_share(fastest: float, envelope: Envelope) -> float:
+    """Return the share of every step that braking takes off in a tick where the fastest joint's is so long."""
+    return BRAKE_SHARE * min([end.stop_rad for end in envelope.joints]) / fastest
+
+
+def stretch(lost: float, envelope: Envelope) -> float:
+    """Return how many steps an arm goes that takes one, begins to brake, and loses that share of it in every tick."""
+    return 1.0 + envelope.onset + 0.5 / lost
+
+
+def too_fast(
+    now_rad: Vec6,
+    steps: Sequence[float],
+    places: tuple[Points, Place, Place],
+    end: Points | None,
+    lost: float,
+    envelope: Envelope,
+) -> list[Met]:
+    """Return the limits that a step would go at too fast; none, nearly always.
 
     Args:
         now_rad: the last command.
-        last_rad: the one before.
-        q_rad: the one that is wanted.
-        now: points and tilt for the last command, as chain.ToolChain.points returns them.
-        to: those for the one that is wanted.
+        steps: how far each joint would go.
+        places: points at the command before the last; points and tilt at the last and where the step leads.
+        end: points where joints that brake together would come to rest; None where the tool goes straight and slides
+            along its fences.
+        lost: share of every step that braking takes off in a tick.
         envelope: the limits.
     """
-    share = _of_joints(now_rad, last_rad, q_rad, envelope)
-    share = min(share, _of_speeds(now[0], to[0], envelope), _of_fences(now[0], to[0], envelope))
-    return min(share, _of_cone(now[1], to[1], envelope))
+    before, now, to = places
+    met = _of_joints(now_rad, steps, lost, envelope)
+    met += _of_speeds(before, now[0], to[0], envelope)
+    met += _of_fences(now[0], to[0], end, lost, envelope)
+    return met + _of_cone(now[1], to[1], lost, envelope)
+
+
+def share_of_way(met: Met, steps: Sequence[float], now: Place, base: Place, envelope: Envelope) -> float:
+    """Return how much of the way from a braking arm's step to the one that was wanted a limit leaves, 0 to 1.
+
+    Args:
+        met: the limit.
+        steps: the braking arm's.
+        now: points and tilt at the last command.
+        base: those where the braking arm's step leads.
+        envelope: the limits.
+    """
+    i = met.index
+    if met.kind == JOINT:
+        size = steps[i] if met.size > 0.0 else -steps[i]
+    elif met.kind == PART:
+        size = math.dist(now[0][i], base[0][i])
+    elif met.kind == FENCE:
+        fence = envelope.fences[i]
+        size = fence.gap(now[0][fence.part]) - fence.gap(base[0][fence.part])
+    else:
+        size = _angle(base[1]) - _angle(now[1])
+    wanted = abs(met.size)
+    return min(1.0, (met.most - size) / (wanted - size)) if size < met.most else 0.0
 
 
 def share_of_giving_way(now_rad: Vec6, last_rad: Vec6, q_rad: Vec6, measured_rad: Vec6, envelope: Envelope) -> float:
@@ -55,66 +131,74 @@ def share_of_giving_way(now_rad: Vec6, last_rad: Vec6, q_rad: Vec6, measured_rad
         step, before, back = q - now, now - last, at - now
         if step < 0.0:
             step, before, back = -step, -before, -back
-        most = RESERVE * end.braking_rad + max(0.0, before, back)
+        most = RESERVE * end.gain_rad + max(0.0, before, back)
         if step > most:
             share = min(share, most / step)
     return share
 
 
-def _of_joints(now_rad: Vec6, last_rad: Vec6, q_rad: Vec6, envelope: Envelope) -> Held:
-    best, name = 1.0, ""
-    for now, last, q, end in zip(now_rad, last_rad, q_rad, envelope.joints, strict=True):
-        step = q - now
-        if step == 0.0:
-            continue
-        size, before = abs(step), now - last if step > 0.0 else last - now
-        most = RESERVE * end.braking_rad + (before if before > 0.0 else 0.0)
-        if size > most and most / size < best:
-            best, name = most / size, "joint_acceleration"
+def _of_joints(now_rad: Vec6, steps: Sequence[float], lost: float, envelope: Envelope) -> list[Met]:
+    met: list[Met] = []
+    for i, (now, step, end) in enumerate(zip(now_rad, steps, envelope.joints, strict=True)):
+        size = abs(step)
+        most = JOINT_RESERVE * end.step_rad
+        if size > most:
+            met.append(Met("joint_speed", JOINT, i, step, most))
         gap = end.high_rad - now if step > 0.0 else now - end.low_rad
         if gap - size < end.margin_rad:
             soft = RESERVE * soft_step(gap, end.margin_rad, end.step_rad)
-            most = min(soft, braking_step(gap, RESERVE * RESERVE * end.braking_rad))
-            if size > most and most / size < best:
-                best, name = most / size, "soft_margin"
-    return best, name
+            braking = min(RESERVE * RESERVE * end.gain_rad, lost * size)
+            most = min(soft, braking_step(gap, braking, envelope.onset))
+            if size > most:
+                met.append(Met("soft_margin", JOINT, i, step, most))
+    return met
 
 
-def _of_speeds(now: Points, to: Points, envelope: Envelope) -> Held:
-    best, name = 1.0, ""
+def _of_speeds(before: Points, now: Points, to: Points, envelope: Envelope) -> list[Met]:
+    met: list[Met] = []
     for i, most in enumerate(envelope.part_step_m):
         (x, y, z), (u, v, w) = now[i], to[i]
         dx, dy, dz = u - x, v - y, w - z
         squared = dx * dx + dy * dy + dz * dz
         bound = SPEED_RESERVE * most
-        if squared > bound * bound and bound / math.sqrt(squared) < best:
-            best, name = bound / math.sqrt(squared), PART_NAMES[i]
-    return best, name
+        if squared > NEAR_SPEED * NEAR_SPEED * bound * bound:
+            size = math.sqrt(squared)
+            if envelope.overshoot > 0.0:  # what gathers speed goes on doing so while its jerk ends that
+                bound -= envelope.overshoot * max(0.0, size - math.dist(before[i], now[i]))
+            if size > bound:
+                met.append(Met(PART_NAMES[i], PART, i, size, bound))
+    return met
 
 
-def _of_fences(now: Points, to: Points, envelope: Envelope) -> Held:
-    best, name = 1.0, ""
-    for fence in envelope.fences:
-        left = fence.gap(to[fence.part])
+def _of_fences(now: Points, to: Points, end: Points | None, lost: float, envelope: Envelope) -> list[Met]:
+    met: list[Met] = []
+    for i, fence in enumerate(envelope.fences):
+        part = fence.part
+        left = fence.gap(to[part])
         if left > envelope.fence_far_m:
             continue
-        gap = fence.gap(now[fence.part])
-        size = gap - left
+        gap = fence.gap(now[part])
+        size, braking = gap - left, envelope.fence_braking_m
+        if end is not None:
+            size = max(size, (gap - fence.gap(end[part])) / stretch(lost, envelope))
         if size <= 0.0:
             continue
-        most = braking_step(gap - MARGIN_M, envelope.fence_braking_m)
-        if size > most and most / size < best:
-            best, name = most / size, fence.name
-    return best, name
+        if part or end is not None:
+            braking = min(braking, lost * size)
+        most = braking_step(gap - MARGIN_M, braking, envelope.onset)
+        if size > most:
+            met.append(Met(fence.name, FENCE, i, size, most))
+    return met
 
 
-def _of_cone(down_now: float, down_to: float, envelope: Envelope) -> Held:
+def _of_cone(down_now: float, down_to: float, lost: float, envelope: Envelope) -> list[Met]:
     if down_to >= envelope.cone_near_cosine or down_to >= down_now:
-        return 1.0, ""
+        return []
     tilt, left = _angle(down_now), _angle(down_to)
     size = left - tilt
-    most = braking_step(envelope.cone_rad - MARGIN_RAD - tilt, TILT_RAD_S2 * envelope.tick_s * envelope.tick_s)
-    return (most / size, "tool_cone") if size > most else (1.0, "")
+    braking = min(TILT_RAD_S2 * envelope.tick_s * envelope.tick_s, lost * size)
+    most = braking_step(envelope.cone_rad - MARGIN_RAD - tilt, braking, envelope.onset)
+    return [Met("tool_cone", CONE, 0, size, most)] if size > most else []
 
 
 def slid(now_m: Vec3, to_m: Vec3, envelope: Envelope) -> tuple[Vec3, str]:
@@ -135,7 +219,7 @@ def slid(now_m: Vec3, to_m: Vec3, envelope: Envelope) -> tuple[Vec3, str]:
         if fence.part or fence.gap(to_m) > envelope.fence_far_m:
             continue
         gap, left = fence.gap(now_m), fence.gap(to_m)
-        over = gap - left - braking_step(gap - SLIDE_MARGIN_M, envelope.fence_braking_m)
+        over = gap - left - braking_step(gap - SLIDE_MARGIN_M, envelope.fence_braking_m, envelope.onset)
         if over > 0.0 and left < gap:
             nx, ny, nz = fence.away(now_m)
             to_m = (to_m[0] + over * nx, to_m[1] + over * ny, to_m[2] + over * nz)

@@ -63,6 +63,7 @@ class Reason(StrEnum):
     JOINT_SPEED = "joint_speed"
     SOFT_MARGIN = "soft_margin"
     JOINT_ACCELERATION = "joint_acceleration"
+    JOINT_JERK = "joint_jerk"
     PART_SPEED = "part_speed"
     FENCE = "fence"
     CONE = "cone"

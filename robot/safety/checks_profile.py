@@ -11,7 +11,9 @@ __all__ = [
     "Points",
     "check_cone",
     "check_fences",
+    "check_giving_way",
     "check_joint_acceleration",
+    "check_joint_jerk",
     "check_part_speeds",
     "check_soft_margin",
 ]
@@ -38,7 +40,7 @@ def check_soft_margin(q_rad: Vec6, last_rad: Vec6, envelope: Envelope) -> Refusa
         else:
             continue
         most = end.step_rad * (SLOWEST_SHARE + (1.0 - SLOWEST_SHARE) * gap / end.margin_rad)
-        stops = step <= CREEP_RAD or step * step <= 2.0 * end.braking_rad * gap
+        stops = step <= CREEP_RAD or step * step <= 2.0 * end.gain_rad * gap
         if not (stops and step <= most * (1.0 + ROUNDING)):
             detail = (
                 f"joint {i + 1}: expected at most {most:g} rad a tick towards an end {gap:g} rad away, came {step:g}"
@@ -47,26 +49,71 @@ def check_soft_margin(q_rad: Vec6, last_rad: Vec6, envelope: Envelope) -> Refusa
     return None
 
 
-def check_joint_acceleration(
-    q_rad: Vec6, last_rad: Vec6, before_rad: Vec6, measured_rad: Vec6 | None, envelope: Envelope
-) -> Refusal | None:
-    """Refuse a joint whose command changes its speed by more than its acceleration allows in one tick.
+def check_joint_acceleration(q_rad: Vec6, last_rad: Vec6, before_rad: Vec6, envelope: Envelope) -> Refusal | None:
+    """Refuse a joint that gathers speed faster than its acceleration, or changes it faster than a stop's.
 
-    Losing speed without turning round, and giving way to where the arm is measured while something holds it, may be as
-    hard as they will: a stop brakes so, and a command that something pushed back.
+    One that turns round gathers what it has after the turn.
 
     Args:
         q_rad: the command.
         last_rad: the command before.
         before_rad: the one before that.
-        measured_rad: where the arm is, if something pushes it; None where nothing does.
         envelope: how much their speed may change.
     """
     for i, end in enumerate(envelope.joints):
-        last, step, most = last_rad[i] - before_rad[i], q_rad[i] - last_rad[i], end.braking_rad
-        if abs(step - last) <= most:
-            continue
-        back = 0.0 if measured_rad is None else measured_rad[i] - last_rad[i]
+        last, step = last_rad[i] - before_rad[i], q_rad[i] - last_rad[i]
+        gain = abs(step) - (abs(last) if (step < 0.0) == (last < 0.0) else 0.0)
+        if not gain <= end.gain_rad * (1.0 + ROUNDING):
+            detail = (
+                f"joint {i + 1}: expected a gain of at most {end.gain_rad:g} rad on the step {last:g}, came {step:g}"
+            )
+            return Refusal(Reason.JOINT_ACCELERATION, detail, gain - end.gain_rad)
+        if not abs(step - last) <= end.stop_rad * (1.0 + ROUNDING):
+            detail = f"joint {i + 1}: expected a step within {end.stop_rad:g} rad of the last, {last:g}, came {step:g}"
+            return Refusal(Reason.JOINT_ACCELERATION, detail, abs(step - last) - end.stop_rad)
+    return None
+
+
+def check_joint_jerk(
+    q_rad: Vec6, last_rad: Vec6, before_rad: Vec6, earlier_rad: Vec6, envelope: Envelope
+) -> Refusal | None:
+    """Refuse a joint that changes its acceleration faster than a stop's jerk.
+
+    Args:
+        q_rad: the command.
+        last_rad: the command before.
+        before_rad: the one before that.
+        earlier_rad: and the one before that.
+        envelope: how much their acceleration may change.
+    """
+    for i, end in enumerate(envelope.joints):
+        rate = last_rad[i] - 2.0 * before_rad[i] + earlier_rad[i]
+        now = q_rad[i] - 2.0 * last_rad[i] + before_rad[i]
+        if not abs(now - rate) <= end.stop_jerk_rad * (1.0 + ROUNDING):
+            most = end.stop_jerk_rad
+            detail = f"joint {i + 1}: expected steps to change within {most:g} rad of {rate:g}, they did by {now:g}"
+            return Refusal(Reason.JOINT_JERK, detail, abs(now - rate) - most)
+    return None
+
+
+def check_giving_way(
+    q_rad: Vec6, last_rad: Vec6, before_rad: Vec6, measured_rad: Vec6, envelope: Envelope
+) -> Refusal | None:
+    """Refuse a joint whose command gains more than its acceleration allows, but for what gives way to a push.
+
+    Losing speed without turning round, and coming nearer to where the arm is measured, may then be as hard as they
+    will: the push is harder than either.
+
+    Args:
+        q_rad: the command.
+        last_rad: the command before.
+        before_rad: the one before that.
+        measured_rad: where the arm is that something pushes.
+        envelope: how much their speed may change.
+    """
+    for i, end in enumerate(envelope.joints):
+        last, step, most = last_rad[i] - before_rad[i], q_rad[i] - last_rad[i], end.gain_rad
+        back = measured_rad[i] - last_rad[i]
         over = max(step - max(0.0, last, back), min(0.0, last, back) - step)
         if not over <= most:
             detail = f"joint {i + 1}: expected a step within {most:g} rad of the last, {last:g}, came {step:g}"

@@ -27,16 +27,14 @@ from robot.safety.checks_profile import (
     Points,
     check_cone,
     check_fences,
-    check_joint_acceleration,
     check_part_speeds,
     check_soft_margin,
 )
+from robot.safety.course import JointCourse
 from robot.safety.limits import GateLimits
 from robot.safety.stop_check import StopCheck
 
 __all__ = ["Gate"]
-
-AT_ZERO: Vec6 = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 class Gate:
@@ -70,8 +68,9 @@ class Gate:
         self._when_latched, self._stops = when_latched, stops
         self._sequence = 0
         self._force_before_n = 0.0
-        self._q_rad = self._q_before_rad = AT_ZERO
-        self._points = chain.points(AT_ZERO)[0]
+        self._course = JointCourse(envelope)
+        self._points = chain.points(self._course.last_rad)[0]
+        self._is_pushed = False
         self._intent_ns = 0
         self._latched: Refusal | None = None
         self._is_stop_confirmed = True
@@ -98,7 +97,7 @@ class Gate:
 
     def seed(self, state: ArmState) -> None:
         """Start from the measured joints at rest, latch cleared. For the station, after arming or a reset only."""
-        self._q_rad = self._q_before_rad = state.q_rad
+        self._course.seed(state.q_rad)
         self._points = self._chain.points(state.q_rad)[0]
         self._sequence = 0
         self._force_before_n = 0.0
@@ -120,7 +119,7 @@ class Gate:
         refusal = self._latched or self._check(command, state, now_ns)
         if refusal is not None:
             return self._refuse(refusal, stamp_ns=now_ns)
-        self._q_before_rad, self._q_rad = self._q_rad, command.q_rad
+        self._course.add(command.q_rad, is_pushed=self._is_pushed)
         self._sequence = command.sequence
         self._arm.write(command)
         return None
@@ -130,7 +129,7 @@ class Gate:
         return self._refuse(Refusal(reason, detail), stamp_ns=now_ns)
 
     def _check(self, command: ArmCommand, state: ArmState, now_ns: int) -> Refusal | None:
-        """Run the checks in their order. Geometry is not asked of a command that holds still."""
+        """Run the checks in their order. Of a command that holds still it is asked whether it may so soon."""
         limits = self._limits
         force_n = math.hypot(*state.tcp_force_n)
         refusal = (
@@ -144,15 +143,19 @@ class Gate:
         if refusal is not None:
             return refusal
         self._force_before_n = force_n
-        q = command.q_rad
-        if q != self._q_rad:
+        q, last_rad = command.q_rad, self._course.last_rad
+        self._is_pushed = force_n > limits.contact_n
+        pushed_rad = state.q_rad if self._is_pushed else None
+        if q != last_rad:
             refusal = (
                 check_joint_range(q, limits)
-                or check_joint_speed(q, self._q_rad, limits)
-                or self._check_parts(q, state.q_rad if force_n > limits.contact_n else None)
+                or check_joint_speed(q, last_rad, limits)
+                or self._check_parts(q, pushed_rad)
                 or check_intent_age(self._intent_ns, now_ns, limits)
-                or (None if self._stops is None else self._stops.check(q, self._q_rad, state))
+                or (None if self._stops is None else self._stops.check(q, last_rad, state))
             )
+        elif not self._course.is_at_rest:
+            refusal = self._course.check(q, pushed_rad)
         return refusal or check_tracking(q, state.q_rad, limits)
 
     def _check_parts(self, q_rad: Vec6, pushed_rad: Vec6 | None) -> Refusal | None:
@@ -163,13 +166,13 @@ class Gate:
             pushed_rad: where the arm is measured, if the force on its tool says that something holds it: only then a
                 command may give way faster than it may go.
         """
-        envelope, last_rad = self._envelope, self._q_rad
+        envelope, last_rad = self._envelope, self._course.last_rad
         points, down = self._chain.points(q_rad)
         tcp = points[0]
         refusal = (
             check_tool(tcp, self._chain.lowest_m(tcp, down), self._limits)
             or check_soft_margin(q_rad, last_rad, envelope)
-            or check_joint_acceleration(q_rad, last_rad, self._q_before_rad, pushed_rad, envelope)
+            or self._course.check(q_rad, pushed_rad)
             or check_fences(points, envelope)
             or check_cone(down, envelope)
             or check_part_speeds(points, self._points, self._parts_at(pushed_rad), envelope)

@@ -17,7 +17,9 @@ from robot.safety import Gate, GateLimits, Reason, check_profile_fits
 from robot.safety.checks_profile import (
     check_cone,
     check_fences,
+    check_giving_way,
     check_joint_acceleration,
+    check_joint_jerk,
     check_part_speeds,
     check_soft_margin,
 )
@@ -46,38 +48,81 @@ def reason(refusal):
     return None if refusal is None else refusal.reason
 
 
+BY_ROUNDING = 1.0 + 1e-9
+"""What a step may pass a limit by, and the next float may not."""
+
+
 @pytest.mark.parametrize("i", JOINTS)
 @pytest.mark.parametrize("sign", [-1.0, 1.0])
 def test_a_step_that_gains_all_its_acceleration_passes_and_the_next_float_does_not(i, sign):
     rest = (0.0,) * 6
-    most = sign * ENVELOPE.joints[i].braking_rad
-    assert check_joint_acceleration(with_joint(rest, i, most), rest, rest, rest, ENVELOPE) is None
+    most = sign * ENVELOPE.joints[i].gain_rad * BY_ROUNDING
+    assert check_joint_acceleration(with_joint(rest, i, most), rest, rest, ENVELOPE) is None
     beyond = with_joint(rest, i, math.nextafter(most, sign * math.inf))
-    assert reason(check_joint_acceleration(beyond, rest, rest, rest, ENVELOPE)) is Reason.JOINT_ACCELERATION
+    assert reason(check_joint_acceleration(beyond, rest, rest, ENVELOPE)) is Reason.JOINT_ACCELERATION
 
 
 @pytest.mark.parametrize("i", JOINTS)
 @pytest.mark.parametrize("sign", [-1.0, 1.0])
-def test_braking_and_giving_way_pass_however_hard_but_turning_round_does_not(i, sign):
+def test_a_step_that_loses_all_a_stop_may_passes_and_the_next_float_does_not(i, sign):
+    """The last step is so much that the whole of it is the most that may be lost."""
+    rest, most = (0.0,) * 6, sign * ENVELOPE.joints[i].stop_rad * BY_ROUNDING
+    assert check_joint_acceleration(rest, rest, with_joint(rest, i, -most), ENVELOPE) is None
+    beyond = with_joint(rest, i, -math.nextafter(most, sign * math.inf))
+    assert reason(check_joint_acceleration(rest, rest, beyond, ENVELOPE)) is Reason.JOINT_ACCELERATION
+
+
+@pytest.mark.parametrize("i", JOINTS)
+@pytest.mark.parametrize("sign", [-1.0, 1.0])
+def test_a_change_of_acceleration_at_a_stops_jerk_passes_and_the_next_float_does_not(i, sign):
+    rest, most = (0.0,) * 6, sign * ENVELOPE.joints[i].stop_jerk_rad * BY_ROUNDING
+    assert check_joint_jerk(with_joint(rest, i, most), rest, rest, rest, ENVELOPE) is None
+    beyond = with_joint(rest, i, math.nextafter(most, sign * math.inf))
+    assert reason(check_joint_jerk(beyond, rest, rest, rest, ENVELOPE)) is Reason.JOINT_JERK
+    assert check_joint_jerk(rest, rest, rest, with_joint(rest, i, most), ENVELOPE) is None
+    beyond = with_joint(rest, i, math.nextafter(most, sign * math.inf))
+    assert reason(check_joint_jerk(rest, rest, rest, beyond, ENVELOPE)) is Reason.JOINT_JERK
+
+
+@pytest.mark.parametrize("i", JOINTS)
+@pytest.mark.parametrize("sign", [-1.0, 1.0])
+def test_pushed_a_joint_may_brake_and_give_way_however_hard_but_not_turn_round(i, sign):
     tight = envelope(DT, joints=tuple(replace(j, acceleration_rad_s2=5.0) for j in profile().joints))
-    rest, most = (0.0,) * 6, tight.joints[i].braking_rad
+    rest, most = (0.0,) * 6, tight.joints[i].gain_rad
     before, at = with_joint(rest, i, -sign * 0.03), with_joint(rest, i, -sign * 0.02)
-    assert check_joint_acceleration(rest, rest, before, rest, tight) is None
-    assert check_joint_acceleration(at, rest, before, at, tight) is None
+    assert check_giving_way(rest, rest, before, rest, tight) is None
+    assert check_giving_way(at, rest, before, at, tight) is None
     turned = with_joint(rest, i, -sign * 1.001 * most)
-    assert reason(check_joint_acceleration(turned, rest, before, rest, tight)) is Reason.JOINT_ACCELERATION
-    assert reason(check_joint_acceleration(at, rest, rest, None, tight)) is Reason.JOINT_ACCELERATION  # nothing pushes
+    assert reason(check_giving_way(turned, rest, before, rest, tight)) is Reason.JOINT_ACCELERATION
     past = with_joint(rest, i, -sign * (0.02 + 1.001 * most))
-    assert reason(check_joint_acceleration(past, rest, before, at, tight)) is Reason.JOINT_ACCELERATION
+    assert reason(check_giving_way(past, rest, before, at, tight)) is Reason.JOINT_ACCELERATION
+
+
+@given(ANGLES, STEPS, STEPS)
+def test_whatever_acceleration_passes_is_within_gain_and_stop(last, before, step):
+    q, earlier = moved(last, step), moved(last, [-v for v in before])
+    if check_joint_acceleration(q, last, earlier, ENVELOPE) is None:
+        for a, b, c, end in zip(q, last, earlier, ENVELOPE.joints, strict=True):
+            assert abs((a - b) - (b - c)) <= end.stop_rad * BY_ROUNDING
+            assert abs(a - b) <= end.gain_rad * BY_ROUNDING + (abs(b - c) if (a - b) * (b - c) > 0.0 else 0.0) + 1e-15
 
 
 @given(ANGLES, STEPS, STEPS, STEPS)
-def test_whatever_acceleration_passes_is_a_gain_within_the_limit(last, before, step, off):
+def test_whatever_jerk_passes_is_within_a_stops(last, step, before, earlier):
+    befores = moved(last, [-v for v in before])
+    q, earliers = moved(last, step), moved(befores, [-v for v in earlier])
+    if check_joint_jerk(q, last, befores, earliers, ENVELOPE) is None:
+        for x, y, z, end in zip(step, before, earlier, ENVELOPE.joints, strict=True):
+            assert abs((x - y) - (y - z)) <= end.stop_jerk_rad * BY_ROUNDING + 1e-14
+
+
+@given(ANGLES, STEPS, STEPS, STEPS)
+def test_whatever_gives_way_gains_nothing_beyond_the_limit(last, before, step, off):
     q, earlier, measured = moved(last, step), moved(last, [-v for v in before]), moved(last, off)
-    if check_joint_acceleration(q, last, earlier, measured, ENVELOPE) is None:
+    if check_giving_way(q, last, earlier, measured, ENVELOPE) is None:
         for a, b, c, m, end in zip(q, last, earlier, measured, ENVELOPE.joints, strict=True):
             free = (min(0.0, b - c, m - b), max(0.0, b - c, m - b))
-            assert free[0] - end.braking_rad - 1e-12 <= a - b <= free[1] + end.braking_rad + 1e-12
+            assert free[0] - end.gain_rad - 1e-12 <= a - b <= free[1] + end.gain_rad + 1e-12
 
 
 @pytest.mark.parametrize("i", JOINTS)
@@ -89,7 +134,7 @@ def test_in_the_soft_margin_a_joint_goes_slowly_towards_its_end_and_fast_away(i,
     gap = share * end.margin_rad
     q = with_joint(HOME, i, edge - side * gap)
     most = end.step_rad * (0.1 + 0.9 * gap / end.margin_rad)
-    most = min(most, math.sqrt(2.0 * end.braking_rad * gap))
+    most = min(most, math.sqrt(2.0 * end.gain_rad * gap))
     slow, fast = (with_joint(HOME, i, q[i] - side * by) for by in (most * (1.0 - 1e-6), most * (1.0 + 1e-6)))
     assert check_soft_margin(q, slow, ENVELOPE) is None
     assert reason(check_soft_margin(q, fast, ENVELOPE)) is Reason.SOFT_MARGIN

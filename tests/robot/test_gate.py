@@ -15,7 +15,7 @@ from robot.hal.fake import FakeArm
 from robot.kinematics import Kinematics
 from robot.messages import ArmMode, GripCommand, Heading, Outcome
 from robot.safety import Gate, GateLimits, Reason
-from tests.support.profiles import envelope, open_envelope, profile
+from tests.support.profiles import ANY_RATE, envelope, open_envelope, profile
 from tests.support.stations import TICK_NS, arm_state, command
 
 ARM = load_arm("ur5e")
@@ -263,8 +263,9 @@ def test_only_the_gate_writes_to_an_arm():
     assert callers == {"robot/safety/gate.py"}
 
 
-ANY_RATE = tuple(replace(j, acceleration_rad_s2=1000.0) for j in profile().joints)
-NEAR_ENDS = tuple(replace(j, range_rad=(j.range_rad[0], q + 0.03)) for j, q in zip(ANY_RATE, START, strict=True))
+FREE = tuple(replace(j, **ANY_RATE) for j in profile().joints)
+LOW_JERK = tuple(replace(j, stop_jerk_rad_s3=1000.0) for j in profile().joints)
+NEAR_ENDS = tuple(replace(j, range_rad=(j.range_rad[0], q + 0.03)) for j, q in zip(FREE, START, strict=True))
 WALL = Plane(name="wall", point_m=(0.0, 0.005, 0.0), normal=(0.0, -1.0, 0.0))
 
 
@@ -272,12 +273,13 @@ WALL = Plane(name="wall", point_m=(0.0, 0.005, 0.0), normal=(0.0, -1.0, 0.0))
     ("name", "changes", "joint", "step", "expected"),
     [
         ("attended", {}, 0, 0.0026, Reason.JOINT_ACCELERATION),
-        ("attended", {"joints": ANY_RATE}, 0, 0.01, Reason.PART_SPEED),
+        ("attended", {"joints": FREE}, 0, 0.01, Reason.PART_SPEED),
         ("unattended", {"joints": NEAR_ENDS}, 0, 0.019, Reason.SOFT_MARGIN),
-        ("unattended", {"workspace": Workspace(planes=(WALL,))}, 0, 0.019, Reason.FENCE),
-        ("unattended", {"workspace": Workspace(tool_cone_rad=0.01)}, 3, 0.019, Reason.CONE),
-        ("unattended", {}, 0, 0.019, None),
-        ("unattended", {}, 3, 0.019, None),
+        ("unattended", {"joints": FREE, "workspace": Workspace(planes=(WALL,))}, 0, 0.019, Reason.FENCE),
+        ("unattended", {"joints": FREE, "workspace": Workspace(tool_cone_rad=0.01)}, 3, 0.019, Reason.CONE),
+        ("unattended", {"joints": LOW_JERK}, 0, 0.002, Reason.JOINT_JERK),
+        ("unattended", {"joints": FREE}, 0, 0.019, None),
+        ("unattended", {"joints": FREE}, 3, 0.019, None),
     ],
 )
 def test_each_limit_of_the_profile_latches_the_gate(arm, name, changes, joint, step, expected):

@@ -12,7 +12,7 @@ from robot.hal.fake import FakeArm
 from robot.kinematics import Kinematics
 from robot.messages import ArmMode, GripCommand, Heading, Outcome, Verdict
 from robot.safety import Gate, GateLimits, Reason, Refusal
-from tests.support.profiles import envelope, fenced, open_envelope, profile
+from tests.support.profiles import ANY_RATE, envelope, fenced, open_envelope, profile
 from tests.support.stations import TICK_NS, arm_state, command
 
 ARM = load_arm("ur5e")
@@ -94,7 +94,7 @@ def test_a_joints_range_is_asked_before_its_speed():
 
 WALL = fenced(planes=(Plane(name="wall", point_m=(0.0, 0.005, 0.0), normal=(0.0, -1.0, 0.0)),))
 STALE_NS = 10**10
-ANY_RATE = tuple(replace(j, acceleration_rad_s2=1000.0) for j in profile().joints)
+FREE = tuple(replace(j, **ANY_RATE) for j in profile().joints)
 
 
 @pytest.mark.parametrize(
@@ -102,11 +102,11 @@ ANY_RATE = tuple(replace(j, acceleration_rad_s2=1000.0) for j in profile().joint
     [
         ({"name": "attended", "workspace": WALL}, replace(LIMITS, tip_min_m=0.5), True, True, Reason.TABLE),
         ({"name": "attended", "workspace": WALL}, LIMITS, True, True, Reason.JOINT_ACCELERATION),
-        ({"name": "attended", "workspace": WALL, "joints": ANY_RATE}, LIMITS, True, True, Reason.FENCE),
-        ({"name": "attended", "joints": ANY_RATE}, LIMITS, True, True, Reason.PART_SPEED),
-        ({}, LIMITS, True, True, Reason.STALE_INTENT),
-        ({}, LIMITS, False, True, Reason.STOP_RANGE),
-        ({}, LIMITS, False, False, Reason.TRACKING),
+        ({"name": "attended", "workspace": WALL, "joints": FREE}, LIMITS, True, True, Reason.FENCE),
+        ({"name": "attended", "joints": FREE}, LIMITS, True, True, Reason.PART_SPEED),
+        ({"joints": FREE}, LIMITS, True, True, Reason.STALE_INTENT),
+        ({"joints": FREE}, LIMITS, False, True, Reason.STOP_RANGE),
+        ({"joints": FREE}, LIMITS, False, False, Reason.TRACKING),
     ],
 )
 def test_of_what_moves_the_place_is_asked_first_then_the_intent_the_stop_and_the_measured_joints(
@@ -174,7 +174,7 @@ def test_numbers_go_on_from_what_was_sent_and_begin_anew_with_a_seed():
 
 
 def test_speeds_of_parts_are_those_from_the_last_command_to_the_next():
-    gate = made(held=envelope(0.01, name="attended", joints=ANY_RATE))
+    gate = made(held=envelope(0.01, name="attended", joints=FREE))
     step = 0.9 * 0.25 * 0.01 / 0.45
     q = START
     for k in range(1, 6):
@@ -185,15 +185,17 @@ def test_speeds_of_parts_are_those_from_the_last_command_to_the_next():
 
 
 def test_what_gives_way_to_where_it_is_measured_is_not_too_fast():
-    gate = made(held=envelope(0.01, name="attended", joints=ANY_RATE))
+    gate = made(held=envelope(0.01, name="attended", joints=FREE))
     pushed = turned(0.02)
     force_n = (0.0, 0.0, LIMITS.contact_n + 1.0)
     assert gate.write(command(turned(0.015)), arm_state(pushed, force_n=force_n), now_ns=0) is None
 
 
 def test_accelerations_are_told_from_the_last_two_commands():
-    held = envelope(0.01, joints=tuple(replace(j, acceleration_rad_s2=50.0) for j in profile().joints))
-    gate, most = made(held=held), held.joints[0].braking_rad
+    held = envelope(
+        0.01, joints=tuple(replace(j, **ANY_RATE | {"acceleration_rad_s2": 50.0}) for j in profile().joints)
+    )
+    gate, most = made(held=held), held.joints[0].gain_rad
     for k, at in enumerate((0.9 * most, 2.7 * most), start=1):
         assert gate.write(command(turned(at), sequence=k), arm_state(START), now_ns=0) is None
     verdict = gate.write(command(turned(2.7 * most + 2.9 * most), sequence=3), arm_state(START), now_ns=0)

@@ -14,7 +14,9 @@ from robot.safety import Braking, GateLimits, Reason, Refusal, StopCheck
 from robot.safety.checks_profile import (
     check_cone,
     check_fences,
+    check_giving_way,
     check_joint_acceleration,
+    check_joint_jerk,
     check_part_speeds,
     check_soft_margin,
 )
@@ -24,7 +26,7 @@ from tests.support.profiles import envelope
 from tests.support.stations import arm_state
 
 REST = (0.0,) * 6
-END = JointEnd(-1.0, 1.0, 0.5, 0.1, 0.0625)
+END = JointEnd(-1.0, 1.0, 0.5, 0.1, 0.0625, 0.03125, 0.125, 0.1875)
 HELD = replace(
     envelope(0.01), joints=(END,) * 6, part_step_m=(0.5, 0.25, 0.125), cone_rad=0.5, cone_cosine=0.75,
     fences=(PlaneGap("wall", 1, (0.0, 0.0, 1.0), 0.25),),
@@ -93,34 +95,59 @@ def test_the_first_joint_out_of_its_margin_does_not_hide_the_second():
 @pytest.mark.parametrize("sign", [-1.0, 1.0])
 def test_an_acceleration_too_hard_is_told_with_both_steps(i, sign):
     last = sign * 0.125
-    refusal = check_joint_acceleration(joint(i, sign * 0.375), joint(i, last), REST, joint(i, last), HELD)
-    detail = f"joint {i + 1}: expected a step within 0.0625 rad of the last, {last:g}, came {sign * 0.25:g}"
+    refusal = check_joint_acceleration(joint(i, sign * 0.375), joint(i, last), REST, HELD)
+    detail = f"joint {i + 1}: expected a gain of at most 0.0625 rad on the step {last:g}, came {sign * 0.25:g}"
     told(refusal, Reason.JOINT_ACCELERATION, detail, 0.0625)
+    refusal = check_joint_acceleration(joint(i, sign * 0.1875), joint(i, sign * 0.1875), REST, HELD)
+    detail = f"joint {i + 1}: expected a step within 0.125 rad of the last, {sign * 0.1875:g}, came 0"
+    told(refusal, Reason.JOINT_ACCELERATION, detail, 0.0625)
+
+
+@pytest.mark.parametrize("i", range(6))
+@pytest.mark.parametrize("sign", [-1.0, 1.0])
+def test_a_jerk_too_hard_is_told_with_both_changes(i, sign):
+    refusal = check_joint_jerk(joint(i, sign * -0.125), REST, REST, joint(i, sign * 0.125), HELD)
+    detail = (
+        f"joint {i + 1}: expected steps to change within 0.1875 rad of {sign * 0.125:g}, they did by {sign * -0.125:g}"
+    )
+    told(refusal, Reason.JOINT_JERK, detail, 0.0625)
+
+
+@pytest.mark.parametrize("sign", [-1.0, 1.0])
+def test_a_joint_that_turns_gains_what_it_has_after_the_turn(sign):
+    last, before = REST, joint(0, -sign * 0.03125)
+    for step, passes in ((-0.0625, True), (-0.078125, False), (0.09375, True), (0.109375, False)):
+        assert (check_joint_acceleration(joint(0, sign * step), last, before, HELD) is None) is passes
 
 
 @pytest.mark.parametrize("sign", [-1.0, 1.0])
 def test_giving_way_and_braking_end_where_a_gain_begins(sign):
     last, before = joint(0, 0.0), joint(0, -sign * 0.25)
     for step, passes in ((0.3125, True), (-0.0625, True), (0.375, False), (-0.125, False)):
-        refusal = check_joint_acceleration(joint(0, sign * step), last, before, last, HELD)
+        refusal = check_giving_way(joint(0, sign * step), last, before, last, HELD)
         assert (refusal is None) is passes
     pushed = joint(0, sign * 0.5)
     for step, passes in ((0.5625, True), (0.625, False), (-0.0625, True), (-0.125, False)):
-        refusal = check_joint_acceleration(joint(0, sign * step), last, last, pushed, HELD)
+        refusal = check_giving_way(joint(0, sign * step), last, last, pushed, HELD)
         assert (refusal is None) is passes
 
 
 @pytest.mark.parametrize("sign", [-1.0, 1.0])
-def test_a_joint_may_brake_to_rest_however_far_ahead_it_is_measured(sign):
+def test_a_pushed_joint_may_brake_to_rest_however_far_ahead_it_is_measured(sign):
     last, before, ahead = REST, joint(0, -sign * 0.25), joint(0, sign * 0.25)
     for step, passes in ((0.0, True), (-0.0625, True), (-0.125, False)):
-        refusal = check_joint_acceleration(joint(0, sign * step), last, before, ahead, HELD)
+        refusal = check_giving_way(joint(0, sign * step), last, before, ahead, HELD)
         assert (refusal is None) is passes
+    detail = "joint 1: expected a step within 0.0625 rad of the last, {:g}, came {:g}"
+    refusal = check_giving_way(joint(0, sign * -0.125), last, before, ahead, HELD)
+    told(refusal, Reason.JOINT_ACCELERATION, detail.format(sign * 0.25, sign * -0.125), 0.0625)
 
 
-def test_a_joint_that_brakes_does_not_hide_the_next():
-    q, last, before = (0.0, 0.5, *REST[2:]), REST, (-0.25, *REST[1:])
-    assert check_joint_acceleration(q, last, before, last, HELD).detail.startswith("joint 2: ")
+def test_a_joint_that_may_do_what_it_does_does_not_hide_the_next():
+    q, last, before = (0.0, 0.5, *REST[2:]), REST, (-0.0625, *REST[1:])
+    assert check_joint_acceleration(q, last, before, HELD).detail.startswith("joint 2: ")
+    assert check_joint_jerk(q, last, before, before, HELD).detail.startswith("joint 2: ")
+    assert check_giving_way(q, last, before, last, HELD).detail.startswith("joint 2: ")
 
 
 @pytest.mark.parametrize(
