@@ -1,24 +1,23 @@
 """A limits profile made ready for the loops that run every tick: fences as gaps, speeds as steps. Pure maths.
 
-Motion slows down by it and the gate refuses by it. Gaps are metres, positive where it is allowed, 0 on the limit.
+Motion slows down by it and the gate refuses by it.
 """
 
 import math
 
 import msgspec
+import numpy as np
 
 from config.arm import ArmConfig
 from config.limits import ArmPart, KeepOut, Plane, Profile
+from robot.compiled import Table, compiled
+from robot.fences import FenceGap, box_gap, keep_out_gap, plane_gap
 from robot.messages import Vec3
 
 __all__ = [
     "SLOWEST_SHARE",
-    "BoxGap",
     "Envelope",
-    "FenceGap",
     "JointEnd",
-    "KeepOutGap",
-    "PlaneGap",
     "braking_step",
     "soft_step",
 ]
@@ -26,78 +25,10 @@ __all__ = [
 PARTS = (ArmPart.TCP, ArmPart.FLANGE, ArmPart.ELBOW)
 """Order of the points that chain.ToolChain.points returns."""
 FAR_M = 0.01
+N_FENCE = 9
 CONE_NEAR_RAD = 1.0
 SLOWEST_SHARE = 0.1
 """Share of a joint's greatest speed that is left at its very end."""
-
-
-class BoxGap(msgspec.Struct, frozen=True):
-    """Inside of a box."""
-
-    name: str
-    part: int
-    low_m: Vec3
-    high_m: Vec3
-
-    def gap(self, at_m: Vec3) -> float:
-        """Return how far inside a point is: the distance to the nearest face."""
-        (x, y, z), (x0, y0, z0), (x1, y1, z1) = at_m, self.low_m, self.high_m
-        return min(x - x0, x1 - x, y - y0, y1 - y, z - z0, z1 - z)
-
-    def away(self, at_m: Vec3) -> Vec3:
-        """Return the direction in which the gap grows fastest, of length 1."""
-        return _inwards(at_m, self.low_m, self.high_m)
-
-
-class PlaneGap(msgspec.Struct, frozen=True):
-    """One side of a plane."""
-
-    name: str
-    part: int
-    normal: Vec3
-    """Of length 1, towards the side that is allowed."""
-    offset_m: float
-
-    def gap(self, at_m: Vec3) -> float:
-        """Return the distance to the plane."""
-        (x, y, z), (nx, ny, nz) = at_m, self.normal
-        return nx * x + ny * y + nz * z - self.offset_m
-
-    def away(self, at_m: Vec3) -> Vec3:  # noqa: ARG002 - the same everywhere
-        """Return the direction in which the gap grows fastest, of length 1."""
-        return self.normal
-
-
-class KeepOutGap(msgspec.Struct, frozen=True):
-    """Outside of a box with rounded edges."""
-
-    name: str
-    part: int
-    low_m: Vec3
-    high_m: Vec3
-    radius_m: float
-
-    def gap(self, at_m: Vec3) -> float:
-        """Return the distance to the volume; inside of the box, what it takes to get out."""
-        (x, y, z), (x0, y0, z0), (x1, y1, z1) = at_m, self.low_m, self.high_m
-        dx, dy, dz = x0 - x if x < x0 else x - x1, y0 - y if y < y0 else y - y1, z0 - z if z < z0 else z - z1
-        if dx <= 0.0 and dy <= 0.0 and dz <= 0.0:
-            return -min(x - x0, x1 - x, y - y0, y1 - y, z - z0, z1 - z) - self.radius_m
-        dx, dy, dz = dx if dx > 0.0 else 0.0, dy if dy > 0.0 else 0.0, dz if dz > 0.0 else 0.0
-        return math.sqrt(dx * dx + dy * dy + dz * dz) - self.radius_m
-
-    def away(self, at_m: Vec3) -> Vec3:
-        """Return the direction in which the gap grows fastest, of length 1."""
-        nearest = [min(max(v, a), b) for v, a, b in zip(at_m, self.low_m, self.high_m, strict=True)]
-        length = math.dist(at_m, nearest)
-        if length > 0.0:
-            x, y, z = ((v - n) / length for v, n in zip(at_m, nearest, strict=True))
-            return x, y, z
-        x, y, z = _inwards(at_m, self.low_m, self.high_m)
-        return -x, -y, -z
-
-
-FenceGap = BoxGap | PlaneGap | KeepOutGap
 
 
 class JointEnd(msgspec.Struct, frozen=True):
@@ -116,6 +47,10 @@ class JointEnd(msgspec.Struct, frozen=True):
     """Greatest change of that change for whatever reason, by the acceleration of a stop."""
     stop_jerk_rad: float
     """Greatest change of that, by the jerk of a stop."""
+
+
+def _nothing() -> Table:
+    return np.empty((0, 0))
 
 
 class Envelope(msgspec.Struct, frozen=True, kw_only=True):
@@ -138,6 +73,16 @@ class Envelope(msgspec.Struct, frozen=True, kw_only=True):
     """A part that gathers speed goes on by its gain of a tick times this while its joints' jerk ends the gain."""
     fence_far_m: float
     """From a gap this wide no part needs to slow down, however fast it goes."""
+    joint_rows: Table = msgspec.field(default_factory=_nothing)
+    """(6, 8) the joints, field by field; made from them."""
+    fence_rows: Table = msgspec.field(default_factory=_nothing)
+    """(n, 9) the fences, part and row; made from them."""
+
+    def __post_init__(self) -> None:
+        set_field = msgspec.structs.force_setattr
+        set_field(self, "joint_rows", np.array([msgspec.structs.astuple(joint) for joint in self.joints], dtype=float))
+        rows = [(float(fence.part), *fence.row) for fence in self.fences]
+        set_field(self, "fence_rows", np.array(rows, dtype=float).reshape(-1, N_FENCE))
 
     @classmethod
     def of(cls, profile: Profile, arm: ArmConfig, *, tick_s: float) -> "Envelope":
@@ -165,7 +110,7 @@ class Envelope(msgspec.Struct, frozen=True, kw_only=True):
             for joint, limit in zip(arm.joints, profile.joints, strict=True)
         )
         onset = max([(j.gain_rad + j.stop_rad) / (2.0 * j.stop_jerk_rad) for j in joints])
-        fences = [BoxGap(f.name, PARTS.index(part), f.low_m, f.high_m) for f in space.boxes for part in f.parts]
+        fences = [box_gap(f.name, PARTS.index(part), f.low_m, f.high_m) for f in space.boxes for part in f.parts]
         planes = [_plane(plane, part) for plane in space.planes for part in plane.parts]
         outs = [_keep_out(out, part) for out in space.keep_outs for part in out.parts]
         return cls(
@@ -185,7 +130,8 @@ class Envelope(msgspec.Struct, frozen=True, kw_only=True):
         )
 
 
-def braking_step(gap: float, braking: float, onset: float = 0.0) -> float:
+@compiled
+def braking_step(gap: float, braking: float, onset: float) -> float:
     """Return the longest step of one tick after which what is left of a gap still suffices to come to rest in.
 
     A step s leaves gap - s, is gone on with for the onset n, and then the steps fall by `braking` a tick:
@@ -200,6 +146,7 @@ def braking_step(gap: float, braking: float, onset: float = 0.0) -> float:
     return math.sqrt(lost * lost + 2.0 * braking * gap) - lost if gap > 0.0 else 0.0
 
 
+@compiled
 def soft_step(gap: float, margin: float, step: float) -> float:
     """Return the longest step towards an end from a gap before it: from `step` at the margin down to a tenth of it.
 
@@ -212,22 +159,12 @@ def soft_step(gap: float, margin: float, step: float) -> float:
     )
 
 
-def _plane(plane: Plane, part: ArmPart) -> PlaneGap:
+def _plane(plane: Plane, part: ArmPart) -> FenceGap:
     length = math.hypot(*plane.normal)
     x, y, z = (v / length for v in plane.normal)
     px, py, pz = plane.point_m
-    return PlaneGap(plane.name, PARTS.index(part), (x, y, z), x * px + y * py + z * pz)
+    return plane_gap(plane.name, PARTS.index(part), (x, y, z), x * px + y * py + z * pz)
 
 
-def _keep_out(out: KeepOut, part: ArmPart) -> KeepOutGap:
-    return KeepOutGap(out.name, PARTS.index(part), out.low_m, out.high_m, out.radius_m)
-
-
-def _inwards(at_m: Vec3, low_m: Vec3, high_m: Vec3) -> Vec3:
-    """Return the direction away from the nearest face of a box."""
-    _, axis, sign = min(
-        (depth, axis, sign)
-        for axis in range(3)
-        for depth, sign in ((at_m[axis] - low_m[axis], 1.0), (high_m[axis] - at_m[axis], -1.0))
-    )
-    return (sign if axis == 0 else 0.0, sign if axis == 1 else 0.0, sign if axis == 2 else 0.0)
+def _keep_out(out: KeepOut, part: ArmPart) -> FenceGap:
+    return keep_out_gap(out.name, PARTS.index(part), out.low_m, out.high_m, out.radius_m)

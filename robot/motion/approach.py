@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from config.arm import ArmConfig
 from robot.chain import ToolChain
-from robot.compiled import compiled
+from robot.compiled import Table, compiled
 from robot.messages import Vec3, Vec6
 from robot.safety import Braking, Clearance
 
@@ -136,6 +136,49 @@ def _is_far(at: Rooms, there: Rooms, near_m: float) -> bool:
     return d >= a * left >= 0.0 and e >= b * left >= 0.0 and f >= c * left >= 0.0
 
 
+@compiled
+def _singular_slope(links_m: Vec3, q: Vec6, k: int) -> Vec6:
+    """Return how the k-th of the factors changes with the joints: forward differences.  (3,), (6,), () -> (6,)"""
+    here, h, (a, b, c, d, e, f) = singular_room(links_m, q)[k], DIFFERENCE_RAD, q
+    return (
+        (singular_room(links_m, (a + h, b, c, d, e, f))[k] - here) / h,
+        (singular_room(links_m, (a, b + h, c, d, e, f))[k] - here) / h,
+        (singular_room(links_m, (a, b, c + h, d, e, f))[k] - here) / h,
+        (singular_room(links_m, (a, b, c, d + h, e, f))[k] - here) / h,
+        (singular_room(links_m, (a, b, c, d, e + h, f))[k] - here) / h,
+        (singular_room(links_m, (a, b, c, d, e, f + h))[k] - here) / h,
+    )
+
+
+@compiled
+def _over_tool(slope: Vec6, J: Table) -> Vec3:
+    """Return a slope over the joints as one over the tool's place, its turn kept.
+
+    The first three of (J J^T + damping)^-1 J slope, by Cholesky's decomposition.  (6,), (6, 6) -> (3,)
+    """
+    lower, x = np.zeros((6, 6)), np.zeros(6)
+    for i in range(6):
+        for m in range(6):
+            x[i] += J[i, m] * slope[m]
+        for k in range(i + 1):
+            total = DAMPING if i == k else 0.0
+            for m in range(6):
+                total += J[i, m] * J[k, m]
+            for m in range(k):
+                total -= lower[i, m] * lower[k, m]
+            lower[i, k] = math.sqrt(total) if i == k else total / lower[k, k]
+    for i in range(6):
+        for m in range(i):
+            x[i] -= lower[i, m] * x[m]
+        x[i] /= lower[i, i]
+    for back in range(6):
+        i = 5 - back
+        for m in range(i + 1, 6):
+            x[i] -= lower[m, i] * x[m]
+        x[i] /= lower[i, i]
+    return x[0], x[1], x[2]
+
+
 class Approach:
     """Steps of the target of one arm at one table."""
 
@@ -190,7 +233,7 @@ class Approach:
         J = self._clearance.tool_jacobian(now_rad)
         margin_m = self._margins.clearance_m
         walls = [
-            Wall(w.name, w.room, tuple(_over_tool(w.slope, J)), 1.0)
+            Wall(w.name, w.room, _over_tool(_vec6(w.slope), J), 1.0)
             for w in self._bodies(now_rad, margin_m, _length(ahead))
         ]
         left, blamed = yielding(ahead, walls)
@@ -229,7 +272,7 @@ class Approach:
         J = self._clearance.tool_jacobian(q_at)
         margin_m = self._margins.clearance_m + overrun_m
         walls = [
-            Wall(w.name, w.room, tuple(_over_tool(w.slope, J)), w.share)
+            Wall(w.name, w.room, _over_tool(_vec6(w.slope), J), w.share)
             for w in (*self._bodies(q_at, margin_m, _length(step)), *self._singular(q_at))
         ]
         walls += self._fences(at_m, overrun_m)
@@ -278,26 +321,13 @@ class Approach:
         here = singular_room(self._links_m, q)
         for k, (room, least) in enumerate(zip(here, self._least, strict=True)):
             if room < 4.0 * least:
-                yield Wall("singularity", room - least, self._singular_slope(q, k, room), SINGULAR_SHARE)
-
-    def _singular_slope(self, q: Vec6, k: int, here: float) -> tuple[float, ...]:
-        slope = []
-        for i in range(6):
-            moved = list(q)
-            moved[i] += DIFFERENCE_RAD
-            slope.append((singular_room(self._links_m, _vec6(moved))[k] - here) / DIFFERENCE_RAD)
-        return tuple(slope)
+                yield Wall("singularity", room - least, _singular_slope(self._links_m, q, k), SINGULAR_SHARE)
 
     def _is_no_worse(self, q_at: Vec6, q: Vec6, extra_m: float) -> bool:
         """Whether a place keeps the margins, or what the one before had of them where that is less."""
         extra = (extra_m, 0.0, 0.0, 0.0)
         rooms = zip(self._rooms(q_at), self._rooms(q), extra, strict=True)
         return all(there - e >= min(here - e, -TOLERANCE_M) for here, there, e in [*rooms])
-
-
-def _over_tool(slope: Sequence[float], J: Array) -> list[float]:
-    """Return a slope over the joints as one over the tool's place, its turn kept: the first three of J^-T slope."""
-    return np.linalg.solve(J @ J.T + DAMPING * np.eye(6), J @ np.asarray(slope))[:3].tolist()
 
 
 def _length(step: Sequence[float]) -> float:

@@ -9,6 +9,7 @@ from robot.envelope import Envelope
 from robot.geometry import turn_about_vertical, unwound
 from robot.kinematics import Kinematics, UnreachableError
 from robot.messages import Vec3, Vec6
+from robot.motion.free import free_bounds, is_free_step
 from robot.motion.holding import Met, brake_share, share_of_way, slid, stretch, too_fast
 from robot.motion.limiter import AxisLimits, Limiter
 from robot.motion.pacing import braked, part_way, window
@@ -80,6 +81,7 @@ class Follower:
         )
         self._joint_step_rad = tuple(SPEED_SHARE * j.speed_rad_s * tick_s for j in joints)
         self._lean_share = tick_s / LEAN_S
+        self._bounds = free_bounds(envelope, self._kinematics.chain)
         self.seed(arm.home_rad)
 
     def seed(self, q_rad: Vec6) -> None:
@@ -269,10 +271,18 @@ class Follower:
 
         It is brought back towards the step of an arm that brakes; motion goes on from there.
         """
-        chain, now, ends = self._kinematics.chain, self.q_rad, self._envelope.joints
+        chain, now, envelope, ends = self._kinematics.chain, self.q_rad, self._envelope, self._envelope.joints
+        steps = (q, now, self.q_before_rad, self._q_earlier_rad)
+        is_free, points = is_free_step(
+            steps, self._points_before, self._points, chain.rows, self._bounds, envelope.joint_rows,
+            envelope.fence_rows, self._is_upright,
+        )  # fmt: skip
+        if is_free:
+            self._points_before, self._points = self._points[0], points
+            return q
         within = window(now, self.q_before_rad, self._q_earlier_rad, ends)
         wanted = [a - b for a, b in zip(q, now, strict=True)]
-        points, share, name, base = chain.points(q), 1.0, "", wanted
+        share, name, base = 1.0, "", wanted
         if not all(map(le, within.low, wanted)) or not all(map(le, wanted, within.high)):
             base = braked(now, self.q_before_rad, self._q_earlier_rad, ends, within)
             share, name = part_way(wanted, base, within.low, within.high), "joint_acceleration"
@@ -282,7 +292,7 @@ class Follower:
                 base = braked(now, self.q_before_rad, self._q_earlier_rad, ends, within)
             there = chain.points(_moved(now, base))
             for limit in met:
-                left = share_of_way(limit, base, self._points, there, self._envelope)
+                left = share_of_way(limit, base, self._points, there, envelope)
                 if left < share:
                     share, name = left, limit.name
         if share < 1.0:

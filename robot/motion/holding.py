@@ -10,7 +10,9 @@ from collections.abc import Sequence
 
 import msgspec
 
+from robot.compiled import Table, compiled
 from robot.envelope import Envelope, braking_step, soft_step
+from robot.fences import fence_away, fence_gap, row_of
 from robot.messages import Vec3, Vec6
 
 __all__ = [
@@ -18,6 +20,7 @@ __all__ = [
     "Met",
     "Points",
     "brake_share",
+    "led_out",
     "share_of_giving_way",
     "share_of_way",
     "slid",
@@ -201,6 +204,44 @@ def _of_cone(down_now: float, down_to: float, lost: float, envelope: Envelope) -
     return [Met("tool_cone", CONE, 0, size, most)] if size > most else []
 
 
+@compiled
+def _led_out(target_m: Vec3, fences: Table) -> tuple[Vec3, int]:
+    last = -1
+    for k in range(fences.shape[0]):
+        row = row_of(fences, k)
+        gap = fence_gap(row, target_m) - MARGIN_M if fences[k, 0] == 0.0 else 0.0
+        if gap < 0.0:
+            nx, ny, nz = fence_away(row, target_m)
+            target_m = (target_m[0] - gap * nx, target_m[1] - gap * ny, target_m[2] - gap * nz)
+            last = k
+    return target_m, last
+
+
+def led_out(target_m: Vec3, envelope: Envelope) -> tuple[Vec3, str]:
+    """Return the nearest place that fences leave to the tool, and the name of what moved it last, empty for none."""
+    place_m, last = _led_out(target_m, envelope.fence_rows)
+    return place_m, envelope.fences[last].name if last >= 0 else ""
+
+
+@compiled
+def _slid(now_m: Vec3, to_m: Vec3, fences: Table, law: Vec3) -> tuple[Vec3, int]:
+    """Return the same by number, -1 where no fence changed it; the law is Envelope's far, braking and onset."""
+    far_m, braking_m, onset = law
+    last = -1
+    for k in range(fences.shape[0]):
+        row = row_of(fences, k)
+        left = fence_gap(row, to_m)
+        if fences[k, 0] != 0.0 or left > far_m:
+            continue
+        gap = fence_gap(row, now_m)
+        over = gap - left - braking_step(gap - SLIDE_MARGIN_M, braking_m, onset)
+        if over > 0.0 and left < gap:
+            nx, ny, nz = fence_away(row, now_m)
+            to_m = (to_m[0] + over * nx, to_m[1] + over * ny, to_m[2] + over * nz)
+            last = k
+    return to_m, last
+
+
 def slid(now_m: Vec3, to_m: Vec3, envelope: Envelope) -> tuple[Vec3, str]:
     """Return where the tool centre point goes instead, along the fences that it would come too near too fast.
 
@@ -214,17 +255,9 @@ def slid(now_m: Vec3, to_m: Vec3, envelope: Envelope) -> tuple[Vec3, str]:
     Returns:
         The place, and the name of the last fence that changed it, empty where none did.
     """
-    name = ""
-    for fence in envelope.fences:
-        if fence.part or fence.gap(to_m) > envelope.fence_far_m:
-            continue
-        gap, left = fence.gap(now_m), fence.gap(to_m)
-        over = gap - left - braking_step(gap - SLIDE_MARGIN_M, envelope.fence_braking_m, envelope.onset)
-        if over > 0.0 and left < gap:
-            nx, ny, nz = fence.away(now_m)
-            to_m = (to_m[0] + over * nx, to_m[1] + over * ny, to_m[2] + over * nz)
-            name = fence.name
-    return to_m, name
+    law = (envelope.fence_far_m, envelope.fence_braking_m, envelope.onset)
+    place_m, last = _slid(now_m, to_m, envelope.fence_rows, law)
+    return place_m, envelope.fences[last].name if last >= 0 else ""
 
 
 def _angle(cosine: float) -> float:

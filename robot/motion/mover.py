@@ -10,7 +10,7 @@ from robot.messages import ArmState, Heading, Intent, JointTarget, Limited, Twis
 from robot.motion.approach import Approach
 from robot.motion.contact import ContactGuard
 from robot.motion.follower import Follower
-from robot.motion.holding import MARGIN_M, MARGIN_RAD, share_of_giving_way
+from robot.motion.holding import MARGIN_M, MARGIN_RAD, led_out, share_of_giving_way
 from robot.motion.target import (
     MAX_TURN_RAD,
     Shaped,
@@ -294,22 +294,11 @@ class Mover:
 
     def _fenced(self, target_m: Vec3, state: ArmState) -> Shaped:
         """Keep a target inside the workspace and on the leash; where that is held is found only if it matters."""
-        out_m, name = self._led_out(target_m)
+        out_m, name = led_out(target_m, self._envelope)
         if not name and is_free(target_m, state.tcp_position_m, self._limits, stray_m=STRAY_M):
             return Shaped(target_m)
         fenced = fence(out_m, self._leashed_to_m(state), self._limits)
         return Shaped(fenced.position_m, (name, *fenced.limiters)) if name else fenced
-
-    def _led_out(self, target_m: Vec3) -> tuple[Vec3, str]:
-        """Return the nearest place that planes and volumes leave to the tool, and the name of what moved it last."""
-        name = ""
-        for gap_of in self._envelope.fences:
-            gap = 0.0 if gap_of.part else gap_of.gap(target_m) - MARGIN_M
-            if gap < 0.0:
-                nx, ny, nz = gap_of.away(target_m)
-                x, y, z = target_m
-                target_m, name = (x - gap * nx, y - gap * ny, z - gap * nz), gap_of.name
-        return target_m, name
 
     def _leashed_to_m(self, state: ArmState) -> Vec3:
         """Return where the leash is held: where a free tool is by now, or at the tool where something keeps it away."""

@@ -28,6 +28,11 @@ class JointCourse:
         self._kept = self._befores
 
     @property
+    def only(self) -> tuple[Vec6, Vec6] | None:
+        """What came before the last command, if there is one course only; what is not checked keeps to it."""
+        return self._befores[0] if len(self._befores) == 1 else None
+
+    @property
     def is_at_rest(self) -> bool:
         """Whether holding still changes no speed and no acceleration."""
         q = self.last_rad
@@ -66,4 +71,5 @@ class JointCourse:
         if is_pushed:
             pairs.append((q_rad, q_rad))
         self._befores = (pairs[0],) if len(pairs) == 1 else tuple(dict.fromkeys(pairs))
+        self._kept = self._befores
         self.last_rad = q_rad

@@ -32,6 +32,7 @@ from robot.safety.checks_profile import (
 )
 from robot.safety.course import JointCourse
 from robot.safety.limits import GateLimits
+from robot.safety.plain import is_plain, plain_bounds
 from robot.safety.stop_check import StopCheck
 
 __all__ = ["Gate"]
@@ -70,6 +71,7 @@ class Gate:
         self._force_before_n = 0.0
         self._course = JointCourse(envelope)
         self._points = chain.points(self._course.last_rad)[0]
+        self._bounds = plain_bounds(limits, envelope, chain)
         self._is_pushed = False
         self._intent_ns = 0
         self._latched: Refusal | None = None
@@ -148,15 +150,31 @@ class Gate:
         pushed_rad = state.q_rad if self._is_pushed else None
         if q != last_rad:
             refusal = (
-                check_joint_range(q, limits)
-                or check_joint_speed(q, last_rad, limits)
-                or self._check_parts(q, pushed_rad)
+                self._check_place(q, state.q_rad, pushed_rad)
                 or check_intent_age(self._intent_ns, now_ns, limits)
                 or (None if self._stops is None else self._stops.check(q, last_rad, state))
             )
         elif not self._course.is_at_rest:
             refusal = self._course.check(q, pushed_rad)
         return refusal or check_tracking(q, state.q_rad, limits)
+
+    def _check_place(self, q_rad: Vec6, measured_rad: Vec6, pushed_rad: Vec6 | None) -> Refusal | None:
+        """Look at where joints lead and how they go there, check by check where that is not plain."""
+        limits, envelope, course = self._limits, self._envelope, self._course
+        befores = course.only
+        if befores is not None:
+            is_within, points = is_plain(
+                (q_rad, course.last_rad, *befores), measured_rad, self._points, self._chain.rows, self._bounds,
+                envelope.joint_rows, envelope.fence_rows,
+            )  # fmt: skip
+            if is_within:
+                self._points = points
+                return None
+        return (
+            check_joint_range(q_rad, limits)
+            or check_joint_speed(q_rad, course.last_rad, limits)
+            or self._check_parts(q_rad, pushed_rad)
+        )
 
     def _check_parts(self, q_rad: Vec6, pushed_rad: Vec6 | None) -> Refusal | None:
         """Look at where joints lead that are in range and no faster than they may be, and hold the limits profile.

@@ -1,8 +1,8 @@
 """Whether the arm could be stopped after a command before it leaves its limits or comes too near to anything."""
 
 from config.arm import ArmConfig
-from robot.chain import ToolChain
-from robot.compiled import compiled
+from robot.chain import ToolChain, chain_points, lowest_fingertip
+from robot.compiled import Table, compiled
 from robot.geometry import between, difference, stepped
 from robot.messages import ArmState, Box3, Vec3, Vec6
 from robot.safety.checks import Reason, Refusal
@@ -71,6 +71,37 @@ def _range_room(q: Vec6, low: Vec6, high: Vec6) -> float:
     for at, least, most in zip(q, low, high):  # noqa: B905 - compiled: of one length by their types
         room = min(room, at - least, most - at)
     return room
+
+
+@compiled
+def _stayed_inside(
+    q: Vec6,
+    end: Vec6,
+    range_rad: tuple[Vec6, Vec6],
+    workspace_m: Box3,
+    tips_m: Vec3,
+    rows: Table,
+    tool_m: tuple[Vec3, Vec3],
+) -> tuple[bool, float, float]:
+    """Return whether a stop ends inside the limits, and how far inside its fences and ranges the command itself is.
+
+    Args:
+        q: the command.
+        end: where the stop ends.
+        range_rad: least and greatest angles.
+        workspace_m: where the tool centre point may be.
+        tips_m: least height of a fingertip, and ToolChain's tip and finger.
+        rows: the chain's.
+        tool_m: tool centre point and elbow of ToolChain.
+    """
+    low, high = range_rad
+    tip_min_m, tip_m, finger_m = tips_m
+    (there, _, _), down = chain_points(end, rows, tool_m[0], tool_m[1])
+    rest_m = _fence_room(there, lowest_fingertip(there, down, tip_m, finger_m), workspace_m, tip_min_m)
+    (here, _, _), down = chain_points(q, rows, tool_m[0], tool_m[1])
+    room_m = _fence_room(here, lowest_fingertip(here, down, tip_m, finger_m), workspace_m, tip_min_m)
+    is_inside = _range_room(end, low, high) >= 0.0 and rest_m >= -OVERRUN_M
+    return is_inside, room_m, _range_room(q, low, high)
 
 
 class StopCheck:
@@ -155,30 +186,26 @@ class StopCheck:
 
     def _check_limits(self, q: Vec6, end: Vec6) -> Refusal | None:
         """Look at where the arm comes to rest, and take note of how far inside its limits the command is."""
-        limits = self._limits
+        limits, chain = self._limits, self._chain
         low_rad, high_rad = limits.q_min_rad, limits.q_max_rad
+        is_inside, self._fence_m, self._range_rad = _stayed_inside(
+            q, end, (low_rad, high_rad), limits.workspace_m, (limits.tip_min_m, chain.tip_m, chain.finger_m),
+            chain.rows, (chain.tcp_m, chain.elbow_m),
+        )  # fmt: skip
+        if is_inside:
+            return None
         if not _range_room(end, low_rad, high_rad) >= 0.0:
             return Refusal(
                 Reason.STOP_RANGE, f"expected a stop within the joints' ranges, it would end at {_round(end)}"
             )
-        inside_m, tcp, lowest_m = self._inside(end)
-        if not inside_m >= -OVERRUN_M:
-            low, high = limits.workspace_m
-            detail = (
-                f"expected a stop inside {low} to {high} m with the fingertips at {limits.tip_min_m:g} m or higher, "
-                f"it would end at {_round(tcp)} with them at {lowest_m:.4f}"
-            )
-            return Refusal(Reason.STOP_WORKSPACE, detail, -inside_m - OVERRUN_M)
-        self._fence_m = self._inside(q)[0]
-        self._range_rad = _range_room(q, low_rad, high_rad)
-        return None
-
-    def _inside(self, q: Vec6) -> tuple[float, Vec3, float]:
-        """Return how far inside its fences the tool is, where it is, and how high its lowest fingertip."""
-        limits, chain = self._limits, self._chain
-        (tcp, _, _), down = chain.points(q)
-        lowest_m = chain.lowest_m(tcp, down)
-        return _fence_room(tcp, lowest_m, limits.workspace_m, limits.tip_min_m), tcp, lowest_m
+        tcp, lowest_m = chain.tcp_and_lowest(end)
+        low, high = limits.workspace_m
+        detail = (
+            f"expected a stop inside {low} to {high} m with the fingertips at {limits.tip_min_m:g} m or higher, "
+            f"it would end at {_round(tcp)} with them at {lowest_m:.4f}"
+        )
+        inside_m = _fence_room(tcp, lowest_m, limits.workspace_m, limits.tip_min_m)
+        return Refusal(Reason.STOP_WORKSPACE, detail, -inside_m - OVERRUN_M)
 
     def _check_way(self, q: Vec6, end: Vec6, end_gap_m: float, length_m: float, before: Vec6) -> Refusal | None:
         """Look closely: at the command and then between, until bounds meet. What is too near already may part."""

@@ -10,8 +10,9 @@ from msgspec.structs import replace
 from config.limits import ArmPart, Fence, KeepOut, Plane
 from config.posture import part_points, tilt_rad
 from robot.chain import ToolChain
-from robot.envelope import BoxGap, KeepOutGap, PlaneGap, braking_step, soft_step
+from robot.envelope import braking_step, soft_step
 from robot.errors import RobotConfigError
+from robot.fences import box_gap, keep_out_gap, plane_gap
 from robot.hal.fake import FakeArm
 from robot.safety import Gate, GateLimits, Reason, check_profile_fits
 from robot.safety.checks_profile import (
@@ -152,10 +153,10 @@ def test_outside_of_the_soft_margin_a_joint_is_as_fast_as_it_may_be(i):
 def test_a_braking_step_leaves_enough_to_come_to_rest_in(gap, braking):
     n_ticks = 0
     while gap > 1e-9 and n_ticks < 10_000:
-        step = braking_step(gap, braking)
+        step = braking_step(gap, braking, 0.0)
         assert step <= gap
         assert step * step <= 2.0 * braking * (gap - step) * (1.0 + 1e-6) + 1e-12
-        assert step - braking_step(gap - step, braking) <= braking * (1.0 + 1e-9)
+        assert step - braking_step(gap - step, braking, 0.0) <= braking * (1.0 + 1e-9)
         gap, n_ticks = gap - step, n_ticks + 1
     assert n_ticks < 10_000
 
@@ -222,15 +223,15 @@ def test_a_part_on_a_fence_passes_and_the_next_float_does_not(part, kind, on_it,
 @given(POINT, POINT)
 def test_a_gap_changes_by_no_more_than_the_way_and_grows_where_it_says(point, other):
     for fence in (
-        BoxGap("box", 0, (-0.5, -0.6, -0.7), (0.5, 0.6, 0.7)),
-        PlaneGap("plane", 0, (0.6, 0.0, 0.8), 0.1),
-        KeepOutGap("out", 0, (-0.2, -0.3, -0.4), (0.2, 0.3, 0.4), 0.1),
+        box_gap("box", 0, (-0.5, -0.6, -0.7), (0.5, 0.6, 0.7)),
+        plane_gap("plane", 0, (0.6, 0.0, 0.8), 0.1),
+        keep_out_gap("out", 0, (-0.2, -0.3, -0.4), (0.2, 0.3, 0.4), 0.1),
     ):
         assert abs(fence.gap(point) - fence.gap(other)) <= math.dist(point, other) + 1e-12
         away = fence.away(point)
         assert math.hypot(*away) == pytest.approx(1.0)
         there = tuple(v + 1e-6 * n for v, n in zip(point, away, strict=True))
-        is_middle = abs(fence.gap(point)) > 0.2 and not isinstance(fence, PlaneGap)
+        is_middle = abs(fence.gap(point)) > 0.2 and fence.name != "plane"
         assert is_middle or fence.gap(there) >= fence.gap(point) - 1e-12
 
 

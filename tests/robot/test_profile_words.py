@@ -7,7 +7,8 @@ from msgspec.structs import replace
 
 from config.loader import resolve
 from robot.chain import ToolChain
-from robot.envelope import JointEnd, PlaneGap
+from robot.envelope import JointEnd
+from robot.fences import plane_gap
 from robot.hal.fake import FakeArm
 from robot.kinematics import Kinematics
 from robot.safety import Braking, GateLimits, Reason, Refusal, StopCheck
@@ -29,7 +30,7 @@ REST = (0.0,) * 6
 END = JointEnd(-1.0, 1.0, 0.5, 0.1, 0.0625, 0.03125, 0.125, 0.1875)
 HELD = replace(
     envelope(0.01), joints=(END,) * 6, part_step_m=(0.5, 0.25, 0.125), cone_rad=0.5, cone_cosine=0.75,
-    fences=(PlaneGap("wall", 1, (0.0, 0.0, 1.0), 0.25),),
+    fences=(plane_gap("wall", 1, (0.0, 0.0, 1.0), 0.25),),
 )  # fmt: skip
 ORIGIN = ((0.0, 0.0, 0.0),) * 3
 

@@ -1,0 +1,123 @@
+"""Whether a step of motion is so far from every limit that nothing could hold it back. Pure, compiled.
+
+A shortcut for nearly every tick: it may only be too strict. What is not free is looked at limit by limit (holding,
+pacing), and what is free they would leave as it is; a property test holds it to that.
+"""
+
+import math
+
+import numpy as np
+
+from robot.chain import Points, ToolChain, chain_points
+from robot.compiled import Table, compiled
+from robot.envelope import Envelope, braking_step
+from robot.fences import fence_gap, row_of
+from robot.messages import Vec3, Vec6
+from robot.motion.holding import BRAKE_SHARE, JOINT_RESERVE, MARGIN_M, SPEED_RESERVE
+from robot.motion.pacing import RESERVE
+
+__all__ = ["Steps", "free_bounds", "is_free_step"]
+
+Steps = tuple[Vec6, Vec6, Vec6, Vec6]
+"""The joints that are wanted and the three commands before, the newest first."""
+Place = tuple[Points, float]
+"""Points and the cosine of the tilt, as chain.ToolChain.points returns them."""
+
+
+def free_bounds(envelope: Envelope, chain: ToolChain) -> Table:
+    """Return what `is_free_step` holds a step to besides joints and fences.  () -> (3, 6)"""
+    least_stop = min(end.stop_rad for end in envelope.joints)
+    return np.array(
+        [
+            (*chain.tcp_m, *chain.elbow_m),
+            (*envelope.part_step_m, envelope.fence_far_m, envelope.fence_braking_m, envelope.onset),
+            (envelope.overshoot, envelope.cone_near_cosine, least_stop, 0.0, 0.0, 0.0),
+        ]
+    )
+
+
+@compiled
+def _greatest_step(steps: Steps, joints: Table) -> float:
+    """Return how far the joint goes that goes farthest; not a number where one is near any limit of its own."""
+    wanted, now, before, earlier = steps
+    fastest = 0.0
+    for i in range(6):
+        step, was, rate = wanted[i] - now[i], now[i] - before[i], before[i] - earlier[i]
+        size, margin = abs(step), joints[i, 2]
+        if not (
+            abs(step - was) <= RESERVE * min(joints[i, 4], joints[i, 6])
+            and abs(step - 2.0 * was + rate) <= RESERVE * min(joints[i, 5], joints[i, 7])
+            and size <= JOINT_RESERVE * joints[i, 3]
+            and joints[i, 0] + margin + size <= now[i] <= joints[i, 1] - margin - size
+        ):
+            return math.nan
+        fastest = max(fastest, size)
+    return fastest
+
+
+@compiled
+def _way(a: Vec3, b: Vec3) -> float:
+    dx, dy, dz = a[0] - b[0], a[1] - b[1], a[2] - b[2]
+    return math.sqrt(dx * dx + dy * dy + dz * dz)
+
+
+@compiled
+def _are_parts_slow(before: Points, now: Points, to: Points, bounds: Table) -> bool:
+    for i in range(3):
+        size, most = _way(now[i], to[i]), SPEED_RESERVE * bounds[1, i]
+        if not size <= most - bounds[2, 0] * max(0.0, size - _way(before[i], now[i])):
+            return False
+    return True
+
+
+@compiled
+def _are_fences_far(now: Points, to: Points, fences: Table, bounds: Table, fastest: float, is_straight: bool) -> bool:
+    lost = BRAKE_SHARE * bounds[2, 2] / fastest
+    for k in range(fences.shape[0]):
+        part, row = int(fences[k, 0]), row_of(fences, k)
+        left = fence_gap(row, to[part])
+        if left > bounds[1, 3]:
+            continue
+        if not is_straight:
+            return False
+        gap = fence_gap(row, now[part])
+        size = gap - left
+        if not size <= 0.0 and not size <= braking_step(gap - MARGIN_M, min(bounds[1, 4], lost * size), bounds[1, 5]):
+            return False
+    return True
+
+
+@compiled
+def is_free_step(
+    steps: Steps,
+    before: Points,
+    now: Place,
+    rows: Table,
+    bounds: Table,
+    joints: Table,
+    fences: Table,
+    is_straight: bool,
+) -> tuple[bool, Place]:
+    """Return whether a step is free, and where it brings tool, flange and elbow.
+
+    Args:
+        steps: where it leads, and the commands before.
+        before: where the command before the last brought them.
+        now: where the last one did.
+        rows: the chain's, robot.chain.
+        bounds: free_bounds.
+        joints: the envelope's.
+        fences: likewise.
+        is_straight: the tool goes straight; joints' ways bend, and near a fence it matters where they would stop.
+    """
+    b = bounds
+    to, down = chain_points(steps[0], rows, (b[0, 0], b[0, 1], b[0, 2]), (b[0, 3], b[0, 4], b[0, 5]))
+    fastest = _greatest_step(steps, joints)
+    if not fastest > 0.0:
+        return False, (to, down)
+    is_free = (
+        _are_parts_slow(before, now[0], to, b)
+        and (down >= b[2, 1] or down >= now[1])
+        and _are_fences_far(now[0], to, fences, b, fastest, is_straight)
+    )
+    return is_free, (to, down)
