@@ -20,6 +20,8 @@ __all__ = [
 
 ROUNDING = 1e-9
 """Share of a step by which rounding may pass a limit."""
+TINY_RAD = 1e-12
+"""Angles of several radians are known to a few times 1e-16, their third differences to a hundred times less well."""
 CREEP_RAD = 1e-6
 """A joint may come to its end by steps as small as this, from which it need not brake."""
 PART_NAMES = ("tool centre point", "flange", "elbow")
@@ -77,7 +79,9 @@ def check_joint_acceleration(q_rad: Vec6, last_rad: Vec6, before_rad: Vec6, enve
 def check_joint_jerk(
     q_rad: Vec6, last_rad: Vec6, before_rad: Vec6, earlier_rad: Vec6, envelope: Envelope
 ) -> Refusal | None:
-    """Refuse a joint that changes its acceleration faster than a stop's jerk.
+    """Refuse a joint that gathers speed ever faster by more than its jerk, or changes its acceleration by a stop's.
+
+    What let go of a brake gathers speed from there; what turns round does so from the next tick on.
 
     Args:
         q_rad: the command.
@@ -87,12 +91,19 @@ def check_joint_jerk(
         envelope: how much their acceleration may change.
     """
     for i, end in enumerate(envelope.joints):
-        rate = last_rad[i] - 2.0 * before_rad[i] + earlier_rad[i]
-        now = q_rad[i] - 2.0 * last_rad[i] + before_rad[i]
-        if not abs(now - rate) <= end.stop_jerk_rad * (1.0 + ROUNDING):
-            most = end.stop_jerk_rad
+        step, last = q_rad[i] - last_rad[i], last_rad[i] - before_rad[i]
+        rate, now = last - before_rad[i] + earlier_rad[i], step - last
+        most = end.stop_jerk_rad
+        if not abs(now - rate) <= most * (1.0 + ROUNDING):
             detail = f"joint {i + 1}: expected steps to change within {most:g} rad of {rate:g}, they did by {now:g}"
             return Refusal(Reason.JOINT_JERK, detail, abs(now - rate) - most)
+        if now < 0.0:
+            step, last, rate, now = -step, -last, -rate, -now
+        gained, most = rate if rate > 0.0 else 0.0, end.jerk_rad
+        grown = now - gained
+        if step > 0.0 and last >= 0.0 and not grown <= most * (1.0 + ROUNDING) + TINY_RAD:
+            detail = f"joint {i + 1}: expected a gain at most {most:g} rad beyond the last, {gained:g}, came {now:g}"
+            return Refusal(Reason.JOINT_JERK, detail, grown - most)
     return None
 
 

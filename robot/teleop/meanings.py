@@ -16,7 +16,7 @@ MEANINGS = {
     "joint_range": "a joint is at the end of its range",
     "table": "the fingertips are as low over the table as they may be",
     "joint_speed": "a joint is as fast as it may be",
-    "joint_acceleration": "a joint gathers speed no faster",
+    "joint_acceleration": "a joint changes its speed no faster",
     "soft_margin": "a joint nears the end of its range, slower",
     "tcp_speed": "the tool is as fast as the profile lets it",
     "flange_speed": "the flange is as fast as the profile lets it",

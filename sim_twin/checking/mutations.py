@@ -127,13 +127,24 @@ MUTATIONS: tuple[Mutation, ...] = (
     ),
     Mutation(
         name="joint acceleration", told_by=("joint_acceleration", "command_acceleration"),
-        tighten=lambda p: _set_joints(p, acceleration_rad_s2=3.0),
+        tighten=lambda p: _set_joints(p, acceleration_rad_s2=3.0, stop_acceleration_rad_s2=4.0),
         weaken=lambda p: _joints(p, acceleration_rad_s2=BY),
+        families=_FAST,
+    ),
+    Mutation(
+        name="joint stop acceleration", told_by=("command_stop_acceleration",),
+        tighten=lambda p: _set_joints(p, acceleration_rad_s2=3.0, stop_acceleration_rad_s2=3.0),
+        weaken=lambda p: _joints(p, stop_acceleration_rad_s2=BY),
         families=_FAST,
     ),
     Mutation(
         name="joint jerk", told_by=("command_jerk",), tighten=lambda p: _set_joints(p, jerk_rad_s3=60.0),
         weaken=lambda p: _joints(p, jerk_rad_s3=BY), families=_FAST,
+    ),
+    Mutation(
+        name="joint stop jerk", told_by=("command_stop_jerk",),
+        tighten=lambda p: _set_joints(p, jerk_rad_s3=400.0, stop_jerk_rad_s3=400.0),
+        weaken=lambda p: _joints(p, stop_jerk_rad_s3=BY), families=_FAST,
     ),
     Mutation(
         name="tcp speed", told_by=("tcp_speed", "command_tcp_speed"), tighten=lambda p: _speeds(p, tcp_m_s=0.2),

@@ -76,13 +76,25 @@ def test_a_step_that_loses_all_a_stop_may_passes_and_the_next_float_does_not(i, 
 @pytest.mark.parametrize("i", JOINTS)
 @pytest.mark.parametrize("sign", [-1.0, 1.0])
 def test_a_change_of_acceleration_at_a_stops_jerk_passes_and_the_next_float_does_not(i, sign):
+    """A joint that comes to rest and lets go of all its acceleration."""
     rest, most = (0.0,) * 6, sign * ENVELOPE.joints[i].stop_jerk_rad * BY_ROUNDING
-    assert check_joint_jerk(with_joint(rest, i, most), rest, rest, rest, ENVELOPE) is None
-    beyond = with_joint(rest, i, math.nextafter(most, sign * math.inf))
-    assert reason(check_joint_jerk(beyond, rest, rest, rest, ENVELOPE)) is Reason.JOINT_JERK
     assert check_joint_jerk(rest, rest, rest, with_joint(rest, i, most), ENVELOPE) is None
     beyond = with_joint(rest, i, math.nextafter(most, sign * math.inf))
     assert reason(check_joint_jerk(rest, rest, rest, beyond, ENVELOPE)) is Reason.JOINT_JERK
+
+
+@pytest.mark.parametrize("i", JOINTS)
+@pytest.mark.parametrize("sign", [-1.0, 1.0])
+def test_a_gain_that_grows_by_the_joints_jerk_passes_and_the_next_float_does_not(i, sign):
+    rest, most = (0.0,) * 6, sign * (ENVELOPE.joints[i].jerk_rad * BY_ROUNDING + 1e-12)
+    assert check_joint_jerk(with_joint(rest, i, most), rest, rest, rest, ENVELOPE) is None
+    beyond = with_joint(rest, i, math.nextafter(most, sign * math.inf))
+    assert reason(check_joint_jerk(beyond, rest, rest, rest, ENVELOPE)) is Reason.JOINT_JERK
+    braked = with_joint(rest, i, sign * 2.0 * abs(most))  # it let go of a brake, and gathers speed from there
+    assert check_joint_jerk(with_joint(rest, i, most), rest, rest, tuple(-v for v in braked), ENVELOPE) is None
+    assert check_joint_jerk(beyond, rest, rest, tuple(-v for v in braked), ENVELOPE) is not None
+    turning = with_joint(rest, i, sign * 1e-3)  # what turns round does not gather speed yet
+    assert check_joint_jerk(beyond, rest, turning, turning, ENVELOPE) is None
 
 
 @pytest.mark.parametrize("i", JOINTS)
@@ -109,12 +121,15 @@ def test_whatever_acceleration_passes_is_within_gain_and_stop(last, before, step
 
 
 @given(ANGLES, STEPS, STEPS, STEPS)
-def test_whatever_jerk_passes_is_within_a_stops(last, step, before, earlier):
+def test_whatever_jerk_passes_is_within_a_stops_and_where_it_gains_within_its_own(last, step, before, earlier):
     befores = moved(last, [-v for v in before])
     q, earliers = moved(last, step), moved(befores, [-v for v in earlier])
     if check_joint_jerk(q, last, befores, earliers, ENVELOPE) is None:
         for x, y, z, end in zip(step, before, earlier, ENVELOPE.joints, strict=True):
-            assert abs((x - y) - (y - z)) <= end.stop_jerk_rad * BY_ROUNDING + 1e-14
+            now, rate = x - y, y - z
+            assert abs(now - rate) <= end.stop_jerk_rad * BY_ROUNDING + 1e-14
+            if x * now > 0.0 and y * now >= 0.0:
+                assert abs(now) <= max(0.0, math.copysign(rate, rate * now)) + end.jerk_rad * BY_ROUNDING + 2e-12
 
 
 @given(ANGLES, STEPS, STEPS, STEPS)

@@ -1,12 +1,13 @@
 """What a command is judged by: the ones before it, or rest where one gave way to a push."""
 
 import pytest
+from msgspec.structs import replace
 
 from robot.safety import Reason
 from robot.safety.course import JointCourse
-from tests.support.profiles import envelope
+from tests.support.profiles import envelope, profile
 
-ENVELOPE = envelope(0.01)
+ENVELOPE = envelope(0.01, joints=tuple(replace(j, jerk_rad_s3=j.stop_jerk_rad_s3) for j in profile().joints))
 END = ENVELOPE.joints[0]
 GAIN = END.gain_rad
 REST = (0.0,) * 6

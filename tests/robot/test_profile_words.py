@@ -108,9 +108,10 @@ def test_an_acceleration_too_hard_is_told_with_both_steps(i, sign):
 @pytest.mark.parametrize("sign", [-1.0, 1.0])
 def test_a_jerk_too_hard_is_told_with_both_changes(i, sign):
     refusal = check_joint_jerk(joint(i, sign * -0.125), REST, REST, joint(i, sign * 0.125), HELD)
-    detail = (
-        f"joint {i + 1}: expected steps to change within 0.1875 rad of {sign * 0.125:g}, they did by {sign * -0.125:g}"
-    )
+    rates = f"{sign * 0.125:g}, they did by {sign * -0.125:g}"
+    told(refusal, Reason.JOINT_JERK, f"joint {i + 1}: expected steps to change within 0.1875 rad of {rates}", 0.0625)
+    refusal = check_joint_jerk(joint(i, sign * 0.09375), REST, REST, REST, HELD)
+    detail = f"joint {i + 1}: expected a gain at most 0.03125 rad beyond the last, 0, came 0.09375"
     told(refusal, Reason.JOINT_JERK, detail, 0.0625)
 
 

@@ -31,7 +31,15 @@ class Stage:
         self.plant = perturbed_plant(resolved, NOMINAL)
         attended = resolved.limits.profile("attended")
         joints = tuple(
-            replace(j, speed_rad_s=1.0, acceleration_rad_s2=10.0, jerk_rad_s3=400.0) for j in attended.joints
+            replace(
+                j,
+                speed_rad_s=1.0,
+                acceleration_rad_s2=10.0,
+                jerk_rad_s3=400.0,
+                stop_acceleration_rad_s2=20.0,
+                stop_jerk_rad_s3=1500.0,
+            )
+            for j in attended.joints
         )
         self.world, self.profile = self.plant.world, replace(attended, joints=joints)
         self.recorder = Recorder(self.world, most_ticks=N_TICKS)
@@ -120,19 +128,56 @@ def test_a_joint_that_is_faster_than_a_servo_explains_is_seen(stage, share, is_s
     assert stage.judge()["joint_speed"].is_broken is is_seen
 
 
-@pytest.mark.parametrize(("share", "is_seen"), [(0.5, False), (1.5, True)])
-def test_a_speed_that_changes_too_fast_is_seen(stage, share, is_seen):
-    most = stage.profile.joints[5].acceleration_rad_s2
-    speed, at = 0.0, float(stage.data.qpos[5])
-    control = stage.world.joint_controls[5]
-    for _ in range(25):
-        speed += share * most * 0.01
+def go(stage: Stage, speeds: list[float], joint: int = 5) -> dict[str, Reading]:
+    """Let a joint's set-point go at one speed after another, a tick each, and judge it."""
+    control, at = stage.world.joint_controls[joint], float(stage.data.qpos[joint])
+    for speed in speeds:
         at += speed * 0.01
         stage.data.ctrl[control] = at
         stage.tick()
-    came = stage.judge()
+    return stage.judge()
+
+
+def ramp(rate: float, n: int, begin: float = 0.0) -> list[float]:
+    return [begin + rate * 0.01 * k for k in range(1, n + 1)]
+
+
+@pytest.mark.parametrize(("share", "is_seen"), [(0.5, False), (1.5, True)])
+def test_a_speed_that_changes_too_fast_is_seen(stage, share, is_seen):
+    came = go(stage, ramp(share * stage.profile.joints[5].acceleration_rad_s2, 25))
     assert came["command_acceleration"].is_broken is is_seen
     assert came["joint_acceleration"].is_broken is is_seen
+
+
+@pytest.mark.parametrize(("share", "is_seen"), [(0.999, False), (1.01, True)])
+def test_of_set_points_a_gain_beyond_the_acceleration_is_seen_and_a_loss_beyond_a_stops(stage, share, is_seen):
+    joint = stage.profile.joints[5]
+    gained = go(stage, [0.0, *ramp(share * joint.acceleration_rad_s2, 8)])
+    assert gained["command_acceleration"].is_broken is is_seen
+    assert not gained["command_stop_acceleration"].is_broken
+    stage.lay_out()
+    lost = share * joint.stop_acceleration_rad_s2
+    came = go(stage, [*ramp(4.0, 20), *ramp(-lost, 3, 0.8)])
+    assert came["command_stop_acceleration"].is_broken is is_seen
+    assert not came["command_acceleration"].is_broken
+
+
+@pytest.mark.parametrize(("share", "is_seen"), [(0.999, False), (1.01, True)])
+def test_of_set_points_a_gain_that_grows_too_fast_is_seen_and_a_change_beyond_a_stops(stage, share, is_seen):
+    joint = stage.profile.joints[5]
+    grown = go(stage, [*[0.0] * 4, *ramp(share * joint.jerk_rad_s3 * 0.01, 5)])
+    assert grown["command_jerk"].is_broken is is_seen
+    assert not grown["command_stop_jerk"].is_broken
+    stage.lay_out()
+    came = go(stage, [*ramp(4.0, 20), *ramp(4.0 - share * joint.stop_jerk_rad_s3 * 0.01, 3, 0.8)])
+    assert came["command_stop_jerk"].is_broken is is_seen
+    assert not came["command_jerk"].is_broken
+
+
+def test_turning_round_at_a_steady_acceleration_is_no_jerk(stage):
+    came = go(stage, [*ramp(-4.0, 20, 0.33)])
+    assert not came["command_jerk"].is_broken
+    assert came["command_jerk"].value < 1.0
 
 
 @pytest.mark.parametrize(("name", "key"), [("tcp", "tcp_m_s"), ("flange", "flange_m_s"), ("elbow", "elbow_m_s")])
