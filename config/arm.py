@@ -93,6 +93,8 @@ class MotionLimits(Section, frozen=True, kw_only=True):
     """The fingertips may not be commanded lower than this over the table."""
     intent_max_age_s: Positive = 0.1
     state_max_age_s: Positive = 0.05
+    percept_max_age_s: Positive = 0.15
+    """A time step that begins with an older percept comes to rest."""
     tracking_error_rad: Positive = 0.25
     force_limit_n: Positive = 250.0
     """Measured force on the tool that the gate refuses when it lasts longer than one tick."""

@@ -59,6 +59,10 @@ class Lid(Section, frozen=True, kw_only=True):
     """At the least, the widest lid is open after 13 s, half an epoch of the shipped learners."""
     force_n: Annotated[float, Meta(ge=0.5, le=5.0)] = 4.0
     """Greatest force at a leaf's free edge; a leaf's own weight takes 0.3 N of it."""
+    thickness_m: Annotated[float, Meta(ge=0.001, le=0.03)] = 0.005
+    """Of a leaf, whose hinge is in its middle."""
+    padding_m: Annotated[float, Meta(ge=0.0, le=0.03)] = 0.012
+    """On top of a shut leaf."""
 
 
 class Box(Section, frozen=True, kw_only=True):

@@ -3,7 +3,6 @@
 from collections.abc import Callable
 from time import monotonic_ns
 from types import TracebackType
-from typing import Protocol
 
 import msgspec
 
@@ -11,104 +10,29 @@ from config.arm import ArmConfig
 from config.rig import Rig
 from config.scenario import Scenario
 from robot.errors import RobotConfigError, WireError
-from robot.hal.protocols import Resetter, SceneTruth
 from robot.messages import (
     ArmState,
     Executed,
     Grip,
-    GripCommand,
     Intent,
     Outcome,
     Percept,
     PlantIdentity,
-    SceneState,
     StationSpec,
     StationState,
     StepResult,
-    Vec3,
     Verdict,
 )
 from robot.motion import Hand, HandReflexes
 from robot.safety import Answer, Arming, Challenges, Lease, Reason, Tenure, draw_code
+from robot.station_doors import Loop, Perceives, World
+from robot.surroundings import Lookout, Surroundings
 from robot.tick_loop import Stride
 
-__all__ = ["LocalStation", "Perceives"]
+__all__ = ["LocalStation"]
 
 WHOLE_TICKS = 1e-6
 MAX_STEP_S = 10.0
-
-
-class Perceives(Protocol):
-    """What the station needs of perception."""
-
-    def perceive(self, arm: ArmState, scene: SceneState | None) -> Percept:
-        """Return the percept at the arm's stamp."""
-        ...
-
-
-class World(Protocol):
-    """What the station needs of a plant, besides its arm."""
-
-    @property
-    def identity(self) -> PlantIdentity:
-        """Which plant this is; known when its arm is connected."""
-        ...
-
-    @property
-    def truth(self) -> SceneTruth | None:
-        """Ground truth, where there is any."""
-        ...
-
-    @property
-    def resetter(self) -> Resetter:
-        """What lays the table out."""
-        ...
-
-
-class Holder(Protocol):
-    """What holds the arm, in this process or in another."""
-
-    def connect(self) -> None:
-        """Acquire the arm. Moves nothing."""
-        ...
-
-    def engage(self) -> None:
-        """Take command of the arm, unless it is ours already."""
-        ...
-
-    @property
-    def why_lost(self) -> str | None:
-        """Why command was lost between time steps since it was taken, None where it was not."""
-        ...
-
-    def stop(self) -> None:
-        """Stop the arm and give up command."""
-        ...
-
-    def close(self) -> None:
-        """Stop and release the arm. Idempotent, never raises."""
-        ...
-
-
-class Loop(Holder, Protocol):
-    """Who holds the arm and moves it, tick by tick."""
-
-    @property
-    def is_in_contact(self) -> bool:
-        """Whether something holds the tool up."""
-        ...
-
-    def begin_epoch(self, epoch: int) -> int:
-        """Take up an epoch's rules and return the outputs it begins with."""
-        ...
-
-    def seed(self) -> ArmState:
-        """Start everything from the measured state, and return it."""
-        ...
-
-    def stride(self, intent: Intent, grip: GripCommand, *, n_ticks: int, wait_at_m: Vec3 | None = None) -> Stride:
-        """Carry out an intent for so many ticks."""
-        ...
 
 
 class LocalStation:
@@ -156,6 +80,7 @@ class LocalStation:
             challenges=Challenges(now_ns=host_ns, draw=draw_code),
         )  # fmt: skip
         self._cell_shows = cell_shows
+        self._lookout = Lookout(scenario, max_age_s=arm.motion.percept_max_age_s)
         self._tenure = Tenure(arming=self._arming, profile=rig.profile, now_ns=host_ns)
         self._spec = StationSpec(
             n_distances=len(scenario.distances),
@@ -209,6 +134,10 @@ class LocalStation:
     def percept(self) -> Percept:
         """What was perceived last."""
         return self._percept
+
+    def look_at(self, state: ArmState) -> Surroundings:
+        """Perceive anew at a measurement, for whoever checks the gate past the station's door."""
+        return self._lookout.see(self._perceive(state))
 
     @property
     def loop(self) -> Loop:
@@ -317,7 +246,8 @@ class LocalStation:
         duration = self._spec.step_s if duration_s is None else duration_s
         n_ticks = self._whole_ticks(duration)
         grip = self._reflexes.decide(self._percept, _grip_of(intent))
-        stride = self._loop.stride(intent, grip, n_ticks=n_ticks, wait_at_m=self._reflexes.wait_at_m)
+        around = self._lookout.see(self._percept)
+        stride = self._loop.stride(intent, grip, n_ticks=n_ticks, wait_at_m=self._reflexes.wait_at_m, around=around)
         if stride.verdict is not None:
             self._arming.latch(f"{stride.verdict.reason}: {stride.verdict.detail}")
         return self._result(stride, duration if stride.is_begun else 0.0)
@@ -371,6 +301,7 @@ class LocalStation:
                 target_m=stride.target_m,
                 limiters=(*stride.limiters, "object_lost") if is_lost else stride.limiters,
                 limited=stride.limited,
+                unseen=stride.unseen,
             ),
             verdicts=verdicts,
             is_void=is_lost or bool(verdicts),

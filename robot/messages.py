@@ -252,6 +252,8 @@ class Executed(Message, frozen=True, kw_only=True):
     """What shortened or changed the intent (leash, guard, workspace, ...)."""
     limited: tuple[Limited, ...] = ()
     """The same, each with by how much."""
+    unseen: tuple[str, ...] = ()
+    """Things that are not perceived now: the arm kept clear of where they were last, or of wherever they may be."""
 
 
 # --------------------------------------------------------------------------------------------------- plant, station

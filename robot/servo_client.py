@@ -34,6 +34,7 @@ from robot.servo_messages import (
 )
 from robot.servo_process import ENDING_REASONS, serve
 from robot.servo_watch import HUNG_S, ServoWatch
+from robot.surroundings import Surroundings
 from robot.tick_loop import Stride
 
 __all__ = ["ServoClient"]
@@ -176,7 +177,15 @@ class ServoClient:
         self._newest = self._ask(Seed(), Seeded, ANSWER_S).state
         return self._newest
 
-    def stride(self, intent: Intent, grip: GripCommand, *, n_ticks: int, wait_at_m: Vec3 | None = None) -> Stride:
+    def stride(
+        self,
+        intent: Intent,
+        grip: GripCommand,
+        *,
+        n_ticks: int,
+        wait_at_m: Vec3 | None = None,
+        around: Surroundings | None = None,
+    ) -> Stride:
         """Carry out an intent for so many ticks. What latched since the last one is told in its place.
 
         A process that hangs or has ended is gone then: the verdict says so.
@@ -184,7 +193,9 @@ class ServoClient:
         Raises:
             NotEngagedError: there was none already, or nobody has seeded it.
         """
-        request = StrideRequest(intent=pack_intent(intent), grip=grip, n_ticks=n_ticks, wait_at_m=wait_at_m)
+        request = StrideRequest(
+            intent=pack_intent(intent), grip=grip, n_ticks=n_ticks, wait_at_m=wait_at_m, around=around
+        )
         if self._connection is None or self._newest is None:
             raise NotEngagedError("servo process: expected one that holds the arm; connect, engage and seed it")
         self._overhear()

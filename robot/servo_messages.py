@@ -5,6 +5,7 @@ from typing import Any
 import msgspec
 
 from robot.messages import ArmState, GripCommand, Intent, PlantIdentity, Vec3
+from robot.surroundings import Surroundings
 from robot.tick_loop import Stride
 
 __all__ = [
@@ -59,6 +60,8 @@ class StrideRequest(_Tagged, frozen=True, kw_only=True):
     n_ticks: int
     wait_at_m: Vec3 | None = None
     """Where the tool waits for the hand, base frame; None where it need not wait."""
+    around: Surroundings | None = None
+    """What is perceived; None where nobody perceives anything."""
 
 
 class Stop(_Tagged, frozen=True, kw_only=True):

@@ -238,7 +238,7 @@ class ServoServer:
         self._grip = request.grip
         self._is_beginning = True
         intent = unpack_intent(request.intent)
-        verdict = self._loop.begin(intent, n_ticks=n_ticks, wait_at_m=request.wait_at_m)
+        verdict = self._loop.begin(intent, n_ticks=n_ticks, wait_at_m=request.wait_at_m, around=request.around)
         self._is_beginning = False
         if verdict is None:
             self._n_left = max(n_ticks - self._n_over, n_ticks - n_ticks // 2)

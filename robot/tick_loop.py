@@ -17,7 +17,8 @@ from robot.errors import ArmRefusedError, RobotConfigError, StaleStateError, Wir
 from robot.hal.protocols import Arm
 from robot.messages import ArmCommand, ArmState, GripCommand, Intent, Limited, Vec3, Verdict
 from robot.motion import Approach, Mover
-from robot.safety import Braking, Clearance, Gate, GateLimits, Hard, Reason, StopCheck, check_profile_fits
+from robot.safety import Braking, Clearance, Gate, GateLimits, Hard, Obstacles, Reason, StopCheck, check_profile_fits
+from robot.surroundings import Surroundings
 
 __all__ = ["Stride", "TickLoop", "guarded"]
 
@@ -42,6 +43,8 @@ class Stride(msgspec.Struct, frozen=True, kw_only=True):
     """The limiters, each with by how much."""
     verdict: Verdict | None = None
     """The gate's refusal, if it refused."""
+    unseen: tuple[str, ...] = ()
+    """Things that were not perceived when it began."""
 
 
 def guarded(
@@ -63,7 +66,7 @@ def guarded(
     envelope = Envelope.of(profile, config, tick_s=tick_s)
     limits = GateLimits.of(config, arm.spec, table_m=table_m, tick_s=tick_s)
     approach = Approach(config, Clearance(config, scenario, hard=hard), braking=braking)
-    farther = Hard(own_m=hard.own_m + AHEAD_M, table_m=hard.table_m + AHEAD_M, thing_m=hard.thing_m + AHEAD_M)
+    farther = hard.farther(AHEAD_M)
     onset_s = max(joint.acceleration_rad_s2 / joint.jerk_rad_s3 for joint in config.joints)
     stops, soon = (
         StopCheck(
@@ -119,6 +122,8 @@ class TickLoop:
         self._mover, self._gate = guarded(
             arm=arm, config=config, scenario=scenario, rig=rig, profile=profile, when_latched=when_latched
         )
+        self._obstacles = Obstacles(scenario)
+        self._percept_max_age_ns = round(config.motion.percept_max_age_s * 1e9)
         self._tick_s, self._tick_ns = rig.tick_s, round(rig.tick_s * 1e9)
         self.state: ArmState
         self._read_ns = self._epoch = 0
@@ -176,9 +181,32 @@ class TickLoop:
         state = self._before = self._read_now()
         self._gate.seed(state)
         self._mover.seed(state)
+        self._obstacles.seed(state.digital_out, state.stamp_ns)
+        self._surround()
         return state
 
-    def stride(self, intent: Intent, grip: GripCommand, *, n_ticks: int, wait_at_m: Vec3 | None = None) -> Stride:
+    def perceive(self, around: Surroundings) -> None:
+        """Keep clear of things where they are perceived, from now on."""
+        self._gate.perceive(around.stamp_ns)
+        is_changed = self._obstacles.perceive(around)
+        is_changed |= self._obstacles.watch(self.state.digital_out, self.state.tcp_position_m, self.state.stamp_ns)
+        if is_changed:
+            self._surround()
+
+    def _surround(self) -> None:
+        blocks = self._obstacles.blocks
+        self._mover.surround(blocks)
+        self._gate.surround(blocks)
+
+    def stride(
+        self,
+        intent: Intent,
+        grip: GripCommand,
+        *,
+        n_ticks: int,
+        wait_at_m: Vec3 | None = None,
+        around: Surroundings | None = None,
+    ) -> Stride:
         """Carry out an intent for so many ticks.
 
         Args:
@@ -186,8 +214,9 @@ class TickLoop:
             grip: what the hand does meanwhile.
             n_ticks: how long.
             wait_at_m: where in the plane the tool waits for the hand, base frame; None where it need not wait.
+            around: what is perceived; None where nobody perceives anything.
         """
-        verdict = self.begin(intent, n_ticks=n_ticks, wait_at_m=wait_at_m)
+        verdict = self.begin(intent, n_ticks=n_ticks, wait_at_m=wait_at_m, around=around)
         if verdict is not None:
             return self.report(verdict, is_begun=False)
         for _ in range(n_ticks):
@@ -196,12 +225,22 @@ class TickLoop:
                 break
         return self.report(verdict, is_begun=True)
 
-    def begin(self, intent: Intent, *, n_ticks: int, wait_at_m: Vec3 | None = None) -> Verdict | None:
-        """Begin to carry out an intent; ticks do the rest. Returns the gate's refusal, if it refused."""
-        before = self.state
-        verdict = self._gate.admit(intent, now_ns=self._arm.clock.now_ns())
+    def begin(
+        self, intent: Intent, *, n_ticks: int, wait_at_m: Vec3 | None = None, around: Surroundings | None = None
+    ) -> Verdict | None:
+        """Begin to carry out an intent; ticks do the rest. Returns the gate's refusal, if it refused.
+
+        With a percept that is too old nothing moves on: the arm comes to rest.
+        """
+        before, now_ns = self.state, self._arm.clock.now_ns()
+        verdict = self._gate.admit(intent, now_ns=now_ns)
         if verdict is not None:
             return verdict
+        if around is not None:
+            self.perceive(around)
+            if now_ns - around.stamp_ns > self._percept_max_age_ns:
+                self._mover.hold("percept_age")
+                return None
         duration_s = n_ticks * self._tick_s
         if wait_at_m is None:
             self._mover.begin_step(intent, before, duration_s=duration_s)
@@ -220,12 +259,15 @@ class TickLoop:
         try:
             state = self._read(now_ns)
             now_ns = arm.clock.now_ns()  # on a wall clock the state read is newer than the tick's beginning
+            digital_out = self._cell.tick(state)
+            if self._obstacles.watch(digital_out, state.tcp_position_m, state.stamp_ns):
+                self._surround()
             command = ArmCommand(
                 stamp_ns=now_ns,
                 sequence=gate.next_sequence,
                 q_rad=self._mover.tick(state),
                 grip=grip,
-                digital_out=self._cell.tick(state),
+                digital_out=digital_out,
             )
             verdict = gate.write(command, state, now_ns=now_ns)
             if verdict is None:
@@ -249,7 +291,7 @@ class TickLoop:
         mover, before, self._before = self._mover, self._before, self.state
         return Stride(
             before=before, after=self.state, is_begun=is_begun, target_m=mover.target_m, limiters=mover.limiters,
-            limited=mover.limited, is_in_contact=mover.is_in_contact, verdict=verdict,
+            limited=mover.limited, is_in_contact=mover.is_in_contact, verdict=verdict, unseen=self._obstacles.unseen,
         )  # fmt: skip
 
 

@@ -14,11 +14,8 @@ from robot.description import FIXTURE_CONTACT, GRIP_SOLIMP, GRIP_SOLREF, OBJECT_
 from robot.servo import lag_s
 from sim_twin.names import on_table
 
-__all__ = ["LEAF_THICKNESS_M", "build_scene", "leaf_names"]
+__all__ = ["build_scene", "leaf_names"]
 
-LEAF_THICKNESS_M = 0.005
-PADDING_M = 0.012
-"""On top of a leaf. A finger that pressed through a thin leaf to its middle was pushed out below, and stuck there."""
 # Nm/rad. Droop stays under 0.5 mm with the tool's weight compensated; a servo three times as stiff makes a carried
 # object creep 2 mm, because implicitfast changes the velocity step after the contacts were solved.
 SERVO_STIFFNESS = (6_000.0, 6_000.0, 6_000.0, 1_200.0, 1_200.0, 1_200.0)
@@ -149,16 +146,18 @@ def _add_box(spec: mujoco.MjSpec, box: Box, table_m: float) -> None:
     if box.lid is None:
         return
     leaf = lx / 2 + w / 2
+    thick, padding = box.lid.thickness_m, box.lid.padding_m
+    # A finger that pressed through a thin leaf to its middle was pushed out below, and stuck there: hence the padding.
     for name, sign in zip(leaf_names(box), (-1, 1), strict=True):
-        hinge = body.add_body(name=name, pos=[sign * leaf, 0, h + LEAF_THICKNESS_M / 2])
+        hinge = body.add_body(name=name, pos=[sign * leaf, 0, h + thick / 2])
         span = [-0.02, box.lid.open_angle_rad + 0.05]
         hinge.add_joint(
             name=name, type=mujoco.mjtJoint.mjJNT_HINGE, axis=[0, sign, 0], range=span,
             limited=mujoco.mjtLimited.mjLIMITED_TRUE, damping=0.02, armature=0.0005,
         )  # fmt: skip
         hinge.add_geom(
-            name=name, type=_BOX, size=[(leaf - 0.001) / 2, ly / 2 + w, (LEAF_THICKNESS_M + PADDING_M) / 2],
-            pos=[-sign * (leaf - 0.001) / 2, 0, PADDING_M / 2], mass=0.06, rgba=[*_dim(box.colour, 0.86), 1],
+            name=name, type=_BOX, size=[(leaf - 0.001) / 2, ly / 2 + w, (thick + padding) / 2],
+            pos=[-sign * (leaf - 0.001) / 2, 0, padding / 2], mass=0.06, rgba=[*_dim(box.colour, 0.86), 1],
             **_PADDED,
         )  # fmt: skip
         torque = box.lid.force_n * leaf

@@ -17,7 +17,7 @@ from config.arm import ArmConfig
 from robot.chain import ToolChain
 from robot.compiled import Table, compiled
 from robot.messages import Vec3, Vec6
-from robot.safety import Braking, Clearance
+from robot.safety import Block, Braking, Clearance
 
 __all__ = ["Approach", "Margins", "Wall", "links_of", "singular_room", "yielding"]
 
@@ -198,6 +198,16 @@ class Approach:
         self._margins = margins or Margins()
         self._near_m = clearance.most_m - self._margins.clearance_m
         self._least = (self._margins.elbow, self._margins.wrist, self._margins.shoulder_m)
+
+    def put(self, blocks: tuple[Block, ...]) -> None:
+        """Take things to be where they are now."""
+        self._clearance.put(blocks)
+        self._rooms_of = None
+
+    def is_clear(self, now_rad: Vec6, target_rad: Vec6) -> bool:
+        """Whether the way between joints keeps its margins, as far as the joints it begins at do."""
+        floor_m = min(self._margins.clearance_m, self._clearance.gap(now_rad)) - TOLERANCE_M
+        return self._is_way_clear(now_rad, target_rad, floor_m)
 
     def clear_place(self, at_m: Vec3, target_m: Vec3, *, now_rad: Vec6, joints_at: Inverse) -> tuple[Vec3, str | None]:
         """Return a target as near to the one asked for as stays clear, and what kept it away.

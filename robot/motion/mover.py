@@ -21,7 +21,7 @@ from robot.motion.target import (
     is_free,
 )
 from robot.motion.trail import Trail
-from robot.safety import StopCheck
+from robot.safety import Block, StopCheck
 
 __all__ = ["Mover"]
 
@@ -31,6 +31,7 @@ FENCE_MARGIN_M = 1e-4
 """How far inside a fence a command comes to rest that a push would carry past it."""
 STRAY_M = 0.03
 """A tool this far from where its commands should have brought it is held up: the leash is held at the tool then."""
+TINY_M = 1e-6
 N_HALVINGS = 8
 """How finely a joint target that lies beyond a fence is brought back to it."""
 RESEAT_SHARE = 0.9
@@ -98,6 +99,20 @@ class Mover:
         self._amounts = {}
         if self._stops is not None:
             self._stops.seed()
+
+    def surround(self, blocks: tuple[Block, ...]) -> None:
+        """Keep the arm clear of these from now on, and come to rest where they stand in its way."""
+        if self._stops is not None:
+            self._stops.put(blocks)
+        approach, follower = self._approach, self._follower
+        if approach is None:
+            return
+        approach.put(blocks)
+        if follower.is_upright and math.dist(follower.tcp(follower.q_rad), follower.target_m) > TINY_M:
+            target_rad = follower.joints_at(follower.target_m)
+            if target_rad is None or not approach.is_clear(follower.q_rad, target_rad):
+                self._note("moved")
+                follower.brake()
 
     def begin_step(self, intent: Intent, state: ArmState, *, duration_s: float) -> None:
         """Move the target as an intent asks for one time step. The gate has admitted the intent."""

@@ -1,6 +1,7 @@
 """The last say before the arm: limits, checks, distances, stops, the gate that latches, and arming."""
 
 from robot.safety.arming import Armable, Arming, Grant, Operator, TooManyLatchesError
+from robot.safety.blocks import Block
 from robot.safety.challenge import Answer, AnsweredBy, Challenges, draw_code
 from robot.safety.checks import Reason, Refusal
 from robot.safety.clearance import Clearance
@@ -8,6 +9,7 @@ from robot.safety.collision_model import Hard
 from robot.safety.gate import Gate
 from robot.safety.lease import Lease, LeaseBook
 from robot.safety.limits import GateLimits, check_profile_fits
+from robot.safety.obstacles import Obstacles
 from robot.safety.states import TABLE, Event, next_mode
 from robot.safety.stop_check import StopCheck
 from robot.safety.stopping import Braking
@@ -19,6 +21,7 @@ __all__ = [
     "AnsweredBy",
     "Armable",
     "Arming",
+    "Block",
     "Braking",
     "Challenges",
     "Clearance",
@@ -29,6 +32,7 @@ __all__ = [
     "Hard",
     "Lease",
     "LeaseBook",
+    "Obstacles",
     "Operator",
     "Reason",
     "Refusal",

@@ -32,6 +32,8 @@ __all__ = [
     "check_joint_range",
     "check_joint_speed",
     "check_outputs",
+    "check_percept_age",
+    "check_push",
     "check_sequence",
     "check_state",
     "check_tool",
@@ -58,6 +60,7 @@ class Reason(StrEnum):
     ARM_REFUSED = "arm_refused"
     WIRE = "wire"
     STALE_INTENT = "stale_intent"
+    STALE_PERCEPT = "stale_percept"
     ARM_MODE = "arm_mode"
     JOINT_RANGE = "joint_range"
     JOINT_SPEED = "joint_speed"
@@ -188,6 +191,14 @@ def joint_too_far(a_rad: Vec6, b_rad: Vec6, most_rad: Vec6) -> int:
     return -1
 
 
+def check_percept_age(percept_ns: int | None, now_ns: int, limits: GateLimits) -> Refusal | None:
+    """Refuse motion long after the last percept, or with one of the future; None where nobody perceives."""
+    if percept_ns is None or 0 <= now_ns - percept_ns <= limits.percept_max_age_ns:
+        return None
+    most_s, age_s = limits.percept_max_age_ns / 1e9, (now_ns - percept_ns) / 1e9
+    return Refusal(Reason.STALE_PERCEPT, f"expected rest {most_s:g} s after a percept, came motion at {age_s:g} s")
+
+
 def check_joint_range(q_rad: Vec6, limits: GateLimits) -> Refusal | None:
     """Refuse a joint outside its range."""
     i = joint_out_of_range(q_rad, limits.q_min_rad, limits.q_max_rad)
@@ -249,6 +260,27 @@ def check_force(force_n: float, force_before_n: float, limits: GateLimits) -> Re
         f"expected at most {limits.force_max_n:g} N on the tool ({limits.impact_max_n:g} in a blow), came {force_n:g}"
     )
     return Refusal(Reason.FORCE, detail, force_n - limits.force_max_n)
+
+
+def check_push(force_n: Vec3, before_n: float, step_m: Vec3, limits: GateLimits) -> Refusal | None:
+    """Refuse to press on where a push that lasts would be harder than it may be by the end of the tick.
+
+    What gives way, or holds still, does not press on.
+
+    Args:
+        force_n: force of the world on the tool.
+        before_n: how much it was a tick ago: up to the contact force there was no push yet, but a blow perhaps.
+        step_m: where the command moves the tool centre point.
+        limits: the forces that may be.
+    """
+    now_n = math.hypot(*force_n)
+    ahead_n = now_n + max(0.0, now_n - before_n)
+    if before_n <= limits.contact_n or ahead_n <= limits.force_max_n:
+        return None
+    if sum([f * s for f, s in zip(force_n, step_m, strict=True)]) >= 0.0:
+        return None
+    detail = f"expected at most {limits.force_max_n:g} N on the tool by the next tick, it presses on at {now_n:g}"
+    return Refusal(Reason.FORCE, detail, ahead_n - limits.force_max_n)
 
 
 def check_grip(command: ArmCommand, limits: GateLimits) -> Refusal | None:

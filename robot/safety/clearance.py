@@ -8,7 +8,9 @@ from numpy.typing import NDArray
 from config.arm import ArmConfig
 from config.scenario import Scenario
 from robot.messages import Vec6
-from robot.safety.collision_model import PALM, PALM_BALL, Hard, Pair, blocks_of, collision_model
+from robot.safety.blocks import Block
+from robot.safety.collision_model import BALLS, THING_PREFIX, Hard, Pair, collision_model, put
+from robot.safety.obstacles import blocks_of
 
 __all__ = ["Clearance", "Closest"]
 
@@ -27,21 +29,24 @@ class Closest(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Clearance:
-    """Distances of one arm at one table, by MuJoCo's collision pass on shapes alone. Memory: its scratch space.
+    """Distances of one arm at one table, by MuJoCo's collision pass on shapes alone. Memory: where things stand.
 
     Attributes:
         most_m: No gap is told greater than this.
     """
 
     def __init__(self, arm: ArmConfig, scenario: Scenario, *, hard: Hard, reach_m: float = REACH_M) -> None:
+        self._blocks = blocks_of(scenario)
         self._model, self._pairs = collision_model(
-            arm, table_m=scenario.table.height_m, blocks=blocks_of(scenario), hard=hard, reach_m=reach_m
+            arm, table_m=scenario.table.height_m, blocks=self._blocks, hard=hard, reach_m=reach_m
         )
         model = self._model
+        self._things = [model.geom(THING_PREFIX + block.name).id for block in self._blocks]
         self._data = mujoco.MjData(model)
         self._hard, self._reach_m = hard, reach_m
         self.most_m = reach_m - max(hard.own_m, hard.table_m, hard.thing_m)
-        self._palm, self._ball = model.geom(PALM).id, model.geom(PALM_BALL).id
+        self._box_of = {model.geom(ball).id: model.geom(box).id for box, ball in BALLS.items()}
+        """The box that is asked in place of each ball."""
         ends = zip(model.pair_geom1.tolist(), model.pair_geom2.tolist(), strict=True)
         self._pair_of = {frozenset(ab): pair for ab, pair in zip(ends, self._pairs, strict=True)}
         self._segment = np.zeros(6)
@@ -51,6 +56,13 @@ class Clearance:
     def pairs(self) -> tuple[Pair, ...]:
         """What is looked at."""
         return self._pairs
+
+    def put(self, blocks: tuple[Block, ...]) -> None:
+        """Take things to be where they are now; their number and order never change."""
+        for geom, before, block in zip(self._things, self._blocks, blocks, strict=True):
+            if block is not before:
+                put(self._model, geom, block)
+        self._blocks = blocks
 
     def gap(self, q_rad: Vec6) -> float:
         """Return the least distance beyond what each pair keeps, metres, `most_m` where everything is farther.
@@ -65,13 +77,16 @@ class Clearance:
         least = self.most_m
         if not n:
             return least
-        contact = data.contact
+        contact, boxes = data.contact, self._box_of
+        kept = contact.includemargin.tolist()
         gaps = (contact.dist - contact.includemargin).tolist()
-        firsts = contact.geom1.tolist()
+        pairs = contact.geom.tolist()
         for k, gap in enumerate(gaps):
             if gap < least:
-                if self._ball in (firsts[k], contact.geom2[k]):
-                    gap = self._palm_gap(firsts[k], int(contact.geom2[k]))
+                a, b = pairs[k]
+                if a in boxes or b in boxes:
+                    a, b = boxes.get(a, a), boxes.get(b, b)
+                    gap = mujoco.mj_geomDistance(model, data, a, b, self._reach_m, None) - kept[k]
                 least = min(least, gap)
         return least
 
@@ -87,7 +102,7 @@ class Clearance:
                 continue
             seen.add((a, b))
             pair = self._pair_of[frozenset((a, b))]
-            one, two = (self._palm if g == self._ball else g for g in (a, b))
+            one, two = self._box_of.get(a, a), self._box_of.get(b, b)
             distance = mujoco.mj_geomDistance(model, data, one, two, self._reach_m, self._segment)
             gap = distance - self._hard.of(pair.near)
             if gap <= within_m and 0.0 != distance < self._reach_m:
@@ -103,11 +118,6 @@ class Clearance:
         J = np.zeros((6, 6))
         mujoco.mj_jacSite(model, data, J[:3], J[3:], self._tcp)
         return J
-
-    def _palm_gap(self, a: int, b: int) -> float:
-        other = b if a == self._ball else a
-        distance = mujoco.mj_geomDistance(self._model, self._data, self._palm, other, self._reach_m, None)
-        return distance - self._hard.thing_m
 
     def _slope(self, one: int, two: int, distance: float) -> Vec6:
         """Return the gap's slope: the speed of the second nearest point away from the first, along their segment."""

@@ -1,11 +1,12 @@
 """The arm's own shapes and what stands on its table as one MuJoCo model without physics: what distances are taken on.
 
 Links are the file's capsules, the hand is a box for the palm and one for the fingers, wide open. The table is the
-half-space under its top. Boxes, buttons and standing cylinders are solid, over the whole region that the scenario
-may draw them from: links and palm have no business inside of them, and fingers, which have, are not held off things.
+half-space under its top. What stands on it is solid (robot.safety.blocks): links and palm have no business inside of
+it, and fingers, which have, are held off leaves alone that stand or move. Where things stand may change (`put`).
 """
 
 import itertools
+import math
 from collections.abc import Iterator
 from enum import StrEnum
 
@@ -15,14 +16,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from config.arm import ArmConfig
-from config.scenario import Scenario
 from robot.description import dh_constant
+from robot.safety.blocks import Block
 
-__all__ = ["PALM", "PALM_BALL", "THING_PREFIX", "Block", "Hard", "Near", "Pair", "blocks_of", "collision_model"]
+__all__ = ["BALLS", "THING_PREFIX", "Hard", "Near", "Pair", "collision_model", "put"]
 
 Array = NDArray[np.float64]
 THING_PREFIX = "thing/"
-FINGERS, PALM, PALM_BALL = "fingers", "palm", "palm_ball"
+FINGERS, PALM = "fingers", "palm"
+BALLS = {PALM: "palm_ball", FINGERS: "fingers_ball"}
+"""The collision pass finds no distance between boxes that are apart: a ball finds whom a box is to be asked of."""
 ANGLES_TRIED = 36
 NEVER_NEARER_M = 0.002
 """Parts two links apart that no joint angles bring nearer than this cannot touch, however thick their capsules."""
@@ -39,14 +42,8 @@ class Near(StrEnum):
     OWN = "own"
     TABLE = "table"
     THING = "thing"
-
-
-class Block(msgspec.Struct, frozen=True, kw_only=True):
-    """An upright box that links and palm keep out of, base frame, metres."""
-
-    name: str
-    centre_m: tuple[float, float, float]
-    half_m: tuple[float, float, float]
+    LEAF = "leaf"
+    """A lid's leaf that stands or moves, seen from the fingers."""
 
 
 class Pair(msgspec.Struct, frozen=True):
@@ -63,35 +60,15 @@ class Hard(msgspec.Struct, frozen=True, kw_only=True):
     own_m: float = 0.01
     table_m: float = 0.005
     thing_m: float = 0.005
+    leaf_m: float = 0.0
+
+    def farther(self, by_m: float) -> "Hard":
+        """Return distances that are all greater by as much."""
+        return Hard(**{name: value + by_m for name, value in msgspec.structs.asdict(self).items()})
 
     def of(self, near: Near) -> float:
         """Return the distance kept from one kind of thing."""
-        return {Near.OWN: self.own_m, Near.TABLE: self.table_m, Near.THING: self.thing_m}[near]
-
-
-def blocks_of(scenario: Scenario) -> tuple[Block, ...]:
-    """Return what stands on a table, each as wide as the region it is drawn from."""
-    z0 = scenario.table.height_m
-    centres = {box.name: (box.position_m, box.spread_m) for box in scenario.boxes}
-    made = [
-        _block(b.name, b.position_m, b.spread_m, (b.diameter_m, b.diameter_m), z0, b.height_m) for b in scenario.buttons
-    ]
-    for box in scenario.boxes:
-        outer = (box.inner_m[0] + 2.0 * box.wall_m, box.inner_m[1] + 2.0 * box.wall_m)
-        made.append(_block(box.name, box.position_m, box.spread_m, outer, z0, box.height_m))
-    for thing in scenario.cylinders:
-        (x, y), (sx, sy) = centres.get(thing.inside or "", ((0.0, 0.0), (0.0, 0.0)))
-        at = (x + thing.position_m[0], y + thing.position_m[1])
-        spread = (sx + thing.spread_m[0], sy + thing.spread_m[1])
-        made.append(_block(thing.name, at, spread, (thing.diameter_m, thing.diameter_m), z0, thing.height_m))
-    return tuple(made)
-
-
-def _block(
-    name: str, at: tuple[float, float], spread: tuple[float, float], size: tuple[float, float], z0: float, height: float
-) -> Block:
-    half = (size[0] / 2.0 + spread[0], size[1] / 2.0 + spread[1], height / 2.0)
-    return Block(name=name, centre_m=(at[0], at[1], z0 + height / 2.0), half_m=half)
+        return getattr(self, f"{near}_m")
 
 
 def collision_model(
@@ -104,21 +81,28 @@ def collision_model(
     Args:
         arm: the arm's file.
         table_m: height of the table's top, base frame.
-        blocks: what stands on it.
+        blocks: what stands on it, in the order in which `put` takes it later.
         hard: the distances kept.
         reach_m: distances beyond this are not looked at.
     """
     spec = _spec(arm, table_m, blocks)
     pairs = [pair for pair in _pairs(arm, blocks) if _can_touch(arm, spec, pair)]
     for pair in pairs:
-        other = PALM_BALL if pair.part == PALM and pair.near is Near.THING else pair.part
         kept = hard.of(pair.near)
-        spec.add_pair(geomname1=other, geomname2=pair.other, margin=kept, gap=reach_m - kept, condim=1)
+        spec.add_pair(geomname1=_shape(pair), geomname2=pair.other, margin=kept, gap=reach_m - kept, condim=1)
     model = spec.compile()
-    named = {(PALM_BALL if p.part == PALM and p.near is Near.THING else p.part, p.other): p for p in pairs}
+    named = {(_shape(pair), pair.other): pair for pair in pairs}
     ends = zip(model.pair_geom1.tolist(), model.pair_geom2.tolist(), strict=True)
     names = [(model.geom(a).name, model.geom(b).name) for a, b in ends]
     return model, tuple(named.get((a, b)) or named[(b, a)] for a, b in names)
+
+
+def put(model: mujoco.MjModel, geom: int, block: Block) -> None:
+    """Give a thing's shape another place and size, in a compiled model."""
+    model.geom_sameframe[geom] = 0  # else its turn is taken for its body's
+    model.geom_pos[geom], model.geom_quat[geom] = block.centre_m, block.quat
+    model.geom_size[geom] = model.geom_aabb[geom, 3:] = block.half_m
+    model.geom_rbound[geom] = math.hypot(*block.half_m)
 
 
 def _pairs(arm: ArmConfig, blocks: tuple[Block, ...]) -> Iterator[Pair]:
@@ -130,8 +114,15 @@ def _pairs(arm: ArmConfig, blocks: tuple[Block, ...]) -> Iterator[Pair]:
                 yield Pair(a, b, Near.OWN)
     for name in [name for name, link in parts if link > 0 and name != FINGERS]:
         yield Pair(name, "table", Near.TABLE)
-        for block in blocks:
+        for block in [block for block in blocks if not block.is_for_fingers]:
             yield Pair(name, THING_PREFIX + block.name, Near.THING)
+    for block in [block for block in blocks if block.is_for_fingers]:
+        yield Pair(FINGERS, THING_PREFIX + block.name, Near.LEAF)
+
+
+def _shape(pair: Pair) -> str:
+    """Return the shape of the arm's that the collision pass asks for a pair."""
+    return BALLS.get(pair.part, pair.part) if pair.near in (Near.THING, Near.LEAF) else pair.part
 
 
 def _parts(arm: ArmConfig) -> list[tuple[str, int]]:
@@ -140,7 +131,12 @@ def _parts(arm: ArmConfig) -> list[tuple[str, int]]:
 
 
 def _can_touch(arm: ArmConfig, spec: mujoco.MjSpec, pair: Pair) -> bool:
-    """Whether two shapes come near at any joint angles at all; asked where two joints at most are between them."""
+    """Whether two shapes come near at any joint angles at all; asked where two joints at most are between them.
+
+    A thing may come to stand anywhere.
+    """
+    if pair.near in (Near.THING, Near.LEAF):
+        return True
     links = dict(_parts(arm))
     first, last = sorted((links[pair.part], links.get(pair.other, 0)))
     if last - first > OWN_LINKS_APART:
@@ -164,7 +160,9 @@ def _spec(arm: ArmConfig, table_m: float, blocks: tuple[Block, ...]) -> mujoco.M
     world = spec.worldbody
     world.add_geom(name="table", type=_PLANE, size=[2, 2, 0.1], pos=[0, 0, table_m])
     for block in blocks:
-        world.add_geom(name=THING_PREFIX + block.name, type=_BOX, size=block.half_m, pos=block.centre_m)
+        world.add_geom(
+            name=THING_PREFIX + block.name, type=_BOX, size=block.half_m, pos=block.centre_m, quat=block.quat
+        )  # fmt: skip
     for geom in spec.geoms:
         geom.contype = geom.conaffinity = 0
     return spec
@@ -188,13 +186,15 @@ def _add_arm(spec: mujoco.MjSpec, arm: ArmConfig) -> None:
     reach = tool.stroke_m / 2.0 + tool.pad_size_m[0]
     half = [*PALM_HALF_M, palm_end / 2]
     hand.add_geom(name=PALM, type=_BOX, size=half, pos=[0, 0, palm_end / 2])
-    # The collision pass finds no distance between boxes that are apart: a ball finds whom the palm is to be asked of.
-    ball = [float(np.linalg.norm(half)), 0, 0]
-    hand.add_geom(name=PALM_BALL, type=mujoco.mjtGeom.mjGEOM_SPHERE, size=ball, pos=[0, 0, palm_end / 2])
-    hand.add_geom(
-        name=FINGERS, type=_BOX, size=[tool.pad_size_m[1] / 2, reach, (tip_end - palm_end) / 2],
-        pos=[0, 0, (palm_end + tip_end) / 2],
-    )  # fmt: skip
+    _add_ball(hand, PALM, half, palm_end / 2)
+    half = [tool.pad_size_m[1] / 2, reach, (tip_end - palm_end) / 2]
+    hand.add_geom(name=FINGERS, type=_BOX, size=half, pos=[0, 0, (palm_end + tip_end) / 2])
+    _add_ball(hand, FINGERS, half, (palm_end + tip_end) / 2)
+
+
+def _add_ball(hand: mujoco.MjsBody, part: str, half_m: list[float], out_m: float) -> None:
+    size = [float(np.linalg.norm(half_m)), 0, 0]
+    hand.add_geom(name=BALLS[part], type=mujoco.mjtGeom.mjGEOM_SPHERE, size=size, pos=[0, 0, out_m])
 
 
 def _add_capsules(body: mujoco.MjsBody, arm: ArmConfig, link: int, T: Array) -> None:

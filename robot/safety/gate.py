@@ -7,6 +7,7 @@ from robot.chain import ToolChain
 from robot.envelope import Envelope
 from robot.hal.protocols import Arm
 from robot.messages import ArmCommand, ArmState, Outcome, Vec6, Verdict
+from robot.safety.blocks import Block
 from robot.safety.checks import (
     Reason,
     Refusal,
@@ -18,6 +19,8 @@ from robot.safety.checks import (
     check_joint_range,
     check_joint_speed,
     check_outputs,
+    check_percept_age,
+    check_push,
     check_sequence,
     check_state,
     check_tool,
@@ -74,6 +77,7 @@ class Gate:
         self._bounds = plain_bounds(limits, envelope, chain)
         self._is_pushed = False
         self._intent_ns = 0
+        self._percept_ns: int | None = None
         self._latched: Refusal | None = None
         self._is_stop_confirmed = True
 
@@ -104,6 +108,7 @@ class Gate:
         self._sequence = 0
         self._force_before_n = 0.0
         self._intent_ns = state.stamp_ns
+        self._percept_ns = None
         self._latched = None
         if self._stops is not None:
             self._stops.seed()
@@ -115,6 +120,15 @@ class Gate:
             self._intent_ns = now_ns
             return None
         return self._refuse(refusal, stamp_ns=now_ns)
+
+    def surround(self, blocks: tuple[Block, ...]) -> None:
+        """Keep the arm clear of these from now on."""
+        if self._stops is not None:
+            self._stops.put(blocks)
+
+    def perceive(self, stamp_ns: int) -> None:
+        """Take note of when was perceived what the arm is kept clear of. Nothing is asked of its age before."""
+        self._percept_ns = stamp_ns
 
     def write(self, command: ArmCommand, state: ArmState, *, now_ns: int) -> Verdict | None:
         """Send a command, or refuse it and latch. None means it passed and was sent."""
@@ -139,6 +153,7 @@ class Gate:
             or check_sequence(command, self._sequence)
             or check_state(state, command, now_ns, limits)
             or check_force(force_n, self._force_before_n, limits)
+            or self._check_push(command.q_rad, state)
             or check_grip(command, limits)
             or check_outputs(command, limits)
         )
@@ -152,6 +167,7 @@ class Gate:
             refusal = (
                 self._check_place(q, state.q_rad, pushed_rad)
                 or check_intent_age(self._intent_ns, now_ns, limits)
+                or check_percept_age(self._percept_ns, now_ns, limits)
                 or (None if self._stops is None else self._stops.check(q, last_rad, state))
             )
         elif not self._course.is_at_rest:
@@ -175,6 +191,12 @@ class Gate:
             or check_joint_speed(q_rad, course.last_rad, limits)
             or self._check_parts(q_rad, pushed_rad)
         )
+
+    def _check_push(self, q_rad: Vec6, state: ArmState) -> Refusal | None:
+        if q_rad == self._course.last_rad or self._force_before_n <= self._limits.contact_n:
+            return None
+        (x, y, z), (u, v, w) = self._chain.points(q_rad)[0][0], self._points[0]
+        return check_push(state.tcp_force_n, self._force_before_n, (x - u, y - v, z - w), self._limits)
 
     def _check_parts(self, q_rad: Vec6, pushed_rad: Vec6 | None) -> Refusal | None:
         """Look at where joints lead that are in range and no faster than they may be, and hold the limits profile.

@@ -42,6 +42,8 @@ class GateLimits(msgspec.Struct, frozen=True, kw_only=True):
     output_mask: int
     """Bits of the outputs that the arm has."""
     state_max_age_ns: int
+    percept_max_age_ns: int
+    """Age of a percept at which what was begun with it must have come to rest."""
     intent_max_age_ns: int
     """Age of an intent at which commands must have come to rest: its deadline and the time to the end of the leash."""
 
@@ -79,6 +81,7 @@ class GateLimits(msgspec.Struct, frozen=True, kw_only=True):
             grip_speed_m_s=tool.speed_m_s,
             output_mask=(1 << spec.n_outputs) - 1,
             state_max_age_ns=round(motion.state_max_age_s * 1e9),
+            percept_max_age_ns=round((motion.percept_max_age_s + motion.intent_max_age_s + rest_s) * 1e9),
             intent_max_age_ns=round((motion.intent_max_age_s + rest_s) * 1e9),
         )
 

@@ -48,7 +48,7 @@ def _are_joints_plain(commands: Commands, measured_rad: Vec6, bounds: Table, joi
     now, last, before, earlier = commands
     for i in range(6):
         q, step, was, rate = now[i], now[i] - last[i], last[i] - before[i], before[i] - earlier[i]
-        margin, gain, jerk = joints[i, 2], min(joints[i, 4], joints[i, 6]), joints[i, 7]
+        margin, gain, jerk = joints[i, 2], min(joints[i, 4], joints[i, 6]), min(joints[i, 5], joints[i, 7])
         if not (
             max(bounds[0, i], joints[i, 0] + margin) <= q <= min(bounds[1, i], joints[i, 1] - margin)
             and abs(step) <= bounds[2, i]

@@ -5,6 +5,7 @@ from robot.chain import ToolChain, chain_points, lowest_fingertip
 from robot.compiled import Table, compiled
 from robot.geometry import between, difference, stepped
 from robot.messages import ArmState, Box3, Vec3, Vec6
+from robot.safety.blocks import Block
 from robot.safety.checks import Reason, Refusal
 from robot.safety.clearance import Clearance
 from robot.safety.limits import GateLimits
@@ -146,6 +147,11 @@ class StopCheck:
         self._fence_m = 0.0
         self._range_rad = 0.0
         """and every joint so far inside its range."""
+
+    def put(self, blocks: tuple[Block, ...]) -> None:
+        """Take things to be where they are now: what was found of gaps holds no more."""
+        self._clearance.put(blocks)
+        self._room_m = 0.0
 
     def check(self, q_rad: Vec6, before_rad: Vec6, state: ArmState) -> Refusal | None:
         """Refuse joints from which a stop would end outside the limits or pass too near to something.

@@ -211,7 +211,9 @@ class Ring:
             grip=ask.grip or self._same_grip(),
             digital_out=outputs,
         )
-        gate.admit(Hold(), now_ns=now_ns)  # an intent is fresh: what is under trial is the command
+        # Intent and percept are fresh: what is under trial is the command.
+        gate.admit(Hold(), now_ns=now_ns)
+        self._loop.perceive(self._station.look_at(state))
         is_refused = gate.write(command, state, now_ns=now_ns) is not None
         arm.clock.wait_tick()
         self._loop.state = arm.read()

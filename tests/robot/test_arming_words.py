@@ -427,6 +427,7 @@ def test_every_limit_is_the_one_that_file_and_arm_give():
         grip_speed_m_s=tool.speed_m_s,
         output_mask=0b111,
         state_max_age_ns=round(motion.state_max_age_s * 1e9),
+        percept_max_age_ns=round((motion.percept_max_age_s + motion.intent_max_age_s + rest_s) * 1e9),
         intent_max_age_ns=round((motion.intent_max_age_s + rest_s) * 1e9),
     )
 

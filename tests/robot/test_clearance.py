@@ -6,7 +6,8 @@ import pytest
 
 from config.loader import resolve
 from robot.safety.clearance import Clearance
-from robot.safety.collision_model import Hard, Near, blocks_of, collision_model
+from robot.safety.collision_model import Hard, Near, collision_model
+from robot.safety.obstacles import blocks_of
 from robot.safety.sweep import Sweep
 
 RESOLVED = resolve()
@@ -96,14 +97,17 @@ def test_the_tool_jacobian_is_the_difference_of_the_tool_s_place(clearance):
         assert J[:3, i] == pytest.approx(change, abs=1e-4)
 
 
-def test_fingers_are_held_off_the_arm_alone(clearance):
-    assert {p.near for p in clearance.pairs if "fingers" in (p.part, p.other)} == {Near.OWN}
+def test_fingers_are_held_off_the_arm_and_off_leaves_that_stand_and_nothing_else(clearance):
+    of_fingers = [p for p in clearance.pairs if "fingers" in (p.part, p.other)]
+    leaves = {p.other for p in of_fingers if p.near is not Near.OWN}
+    sides = [(box.name, side) for box in SCENARIO.boxes if box.lid for side in ("near", "far")]
+    assert leaves == {f"thing/{name}/leaf_{side}/standing" for name, side in sides}
 
 
 def test_palm_and_links_are_held_off_the_table_and_every_thing_on_it(clearance):
     for part in ("palm", "link_3_3", "link_6_6"):
         others = {p.other for p in clearance.pairs if p.part == part and p.near is not Near.OWN}
-        assert others == {"table", *(f"thing/{b.name}" for b in blocks_of(SCENARIO))}
+        assert others == {"table", *(f"thing/{b.name}" for b in blocks_of(SCENARIO) if not b.is_for_fingers)}
 
 
 def test_neighbours_and_what_can_never_touch_are_not_looked_at(clearance):

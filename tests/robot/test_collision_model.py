@@ -9,8 +9,10 @@ from msgspec.structs import replace
 
 from config.loader import resolve
 from robot.kinematics import Kinematics
+from robot.safety.blocks import Block
 from robot.safety.clearance import Clearance
-from robot.safety.collision_model import Block, Hard, Near, Pair, blocks_of, collision_model
+from robot.safety.collision_model import Hard, Near, Pair, collision_model, put
+from robot.safety.obstacles import blocks_of
 
 RESOLVED = resolve()
 ARM, SCENARIO = RESOLVED.arm, RESOLVED.scenario
@@ -86,6 +88,7 @@ def test_palm_fingers_and_tool_centre_are_where_the_hand_is(built, q):
         "palm": (mujoco.mjtGeom.mjGEOM_BOX, (0.032, 0.06, 0.0414), 0.0414),
         "palm_ball": (mujoco.mjtGeom.mjGEOM_SPHERE, (math.hypot(0.032, 0.06, 0.0414), 0.0, 0.0), 0.0414),
         "fingers": (mujoco.mjtGeom.mjGEOM_BOX, (0.011, 0.0545, 0.0475), 0.1303),
+        "fingers_ball": (mujoco.mjtGeom.mjGEOM_SPHERE, (math.hypot(0.011, 0.0545, 0.0475), 0.0, 0.0), 0.1303),
     }
     for name, (kind, size, out_m) in shapes.items():
         geom = model.geom(name)
@@ -110,7 +113,7 @@ def test_the_table_is_all_below_its_top_and_blocks_are_as_they_were_given(built)
         assert geom.type == mujoco.mjtGeom.mjGEOM_BOX
         assert geom.size == pytest.approx(block.half_m)
         assert data.geom_xpos[geom.id] == pytest.approx(block.centre_m)
-    assert model.ngeom == 7 + 3 + 1 + 2
+    assert model.ngeom == 7 + 4 + 1 + 2
 
 
 def test_nothing_touches_but_the_pairs_that_are_named(built):
@@ -128,9 +131,8 @@ def test_the_pairs_are_those_that_may_touch_and_no_other(built):
     _, pairs = built
     own = {Pair(a, b, Near.OWN) for a, others in OWN.items() for b in others}
     table = {Pair(part, "table", Near.TABLE) for part in MOVING}
-    things = {Pair(part, f"thing/{b.name}", Near.THING) for part in MOVING for b in BLOCKS}
-    too_far = {Pair("link_2_2", "thing/two", Near.THING)}  # half a metre off, the upper arm is shorter
-    assert set(pairs) == (own | table | things) - too_far
+    things = {Pair(part, f"thing/{b.name}", Near.THING) for part in (LINKS[1], *MOVING) for b in BLOCKS}
+    assert set(pairs) == own | table | things
     assert len(pairs) == len(set(pairs))
 
 
@@ -172,22 +174,27 @@ def test_what_never_comes_within_two_millimetres_is_not_looked_at(gap_m, is_look
     assert (Pair("link_1_1", "table", Near.TABLE) in pairs) is is_looked_at
 
 
-@pytest.mark.parametrize("gap_m", [0.00195, 0.0021])
-@pytest.mark.parametrize(("x", "y"), [(1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0)])
-def test_the_base_is_turned_all_the_way_round_to_see_what_its_shoulder_comes_near_to(x, y, gap_m):
-    # The shoulder bulges 0.04 m to one side, 0.065 m thick.
-    out_m = 0.04 + 0.065 + gap_m + 0.02
-    post = Block(name="post", centre_m=(x * out_m, y * out_m, 0.1625), half_m=(0.02, 0.02, 0.001))
-    _, pairs = collision_model(ARM, table_m=TABLE_M, blocks=(post,), hard=HARD, reach_m=REACH_M)
-    assert (Pair("link_1_1", "thing/post", Near.THING) in pairs) is (gap_m < 0.002)
+def test_things_are_looked_at_wherever_they_stand_for_they_may_come_nearer():
+    post = Block(name="post", centre_m=(9.0, 9.0, 9.0), half_m=(0.02, 0.02, 0.001))
+    leaf = Block(name="leaf", centre_m=(9.0, 9.0, 9.0), half_m=(0.02, 0.02, 0.001), is_for_fingers=True)
+    _, pairs = collision_model(ARM, table_m=TABLE_M, blocks=(post, leaf), hard=HARD, reach_m=REACH_M)
+    assert {p.part for p in pairs if p.other == "thing/post"} == {LINKS[1], *MOVING}
+    assert [p for p in pairs if p.other == "thing/leaf"] == [Pair("fingers", "thing/leaf", Near.LEAF)]
 
 
-def test_both_joints_are_turned_to_see_what_the_upper_arm_comes_near_to():
-    T_b = frames((math.pi / 2.0, 0.0, 0.0, 0.0, 0.0, 0.0))[2]
-    centre = tuple((T_b[:3, :3] @ (0.0, 0.0, 0.138) + T_b[:3, 3]).tolist())
-    post = Block(name="post", centre_m=centre, half_m=(0.01, 0.01, 0.01))
-    _, pairs = collision_model(ARM, table_m=TABLE_M, blocks=(post,), hard=HARD, reach_m=REACH_M)
-    assert Pair("link_2_2", "thing/post", Near.THING) in pairs
+def test_a_block_is_put_elsewhere_turned_and_resized_as_if_it_had_been_built_so(built):
+    model, _ = built
+    turn = (math.cos(0.3), 0.0, math.sin(0.3), 0.0)
+    elsewhere = Block(name="one", centre_m=(0.3, -0.2, 0.4), half_m=(0.01, 0.2, 0.03), quat=turn)
+    fresh, _ = collision_model(ARM, table_m=TABLE_M, blocks=(elsewhere, BLOCKS[1]), hard=HARD, reach_m=REACH_M)
+    geom = model.geom("thing/one").id
+    put(model, geom, elsewhere)
+    for name in ("geom_size", "geom_rbound", "geom_aabb"):
+        assert getattr(model, name)[geom] == pytest.approx(getattr(fresh, name)[fresh.geom("thing/one").id])
+    moved, made = placed(model, ARM.home_rad), placed(fresh, ARM.home_rad)
+    assert moved.geom_xpos[geom] == pytest.approx(made.geom_xpos[geom])
+    assert moved.geom_xmat[geom] == pytest.approx(made.geom_xmat[geom])
+    assert abs(moved.geom_xmat[geom][2]) == pytest.approx(math.sin(0.6))
 
 
 def test_parts_beside_one_another_in_the_file_are_looked_at_if_a_link_lies_between_them():
@@ -200,12 +207,16 @@ def test_parts_beside_one_another_in_the_file_are_looked_at_if_a_link_lies_betwe
 
 def test_distances_kept_have_defaults_and_are_told_by_kind():
     assert Hard() == Hard(own_m=0.01, table_m=0.005, thing_m=0.005)
-    assert [HARD.of(near) for near in (Near.OWN, Near.TABLE, Near.THING)] == [0.011, 0.012, 0.013]
+    assert [HARD.of(near) for near in (Near.OWN, Near.TABLE, Near.THING, Near.LEAF)] == [0.011, 0.012, 0.013, 0.0]
+    farther = HARD.farther(0.002)
+    assert [farther.of(near) for near in Near] == pytest.approx([0.013, 0.014, 0.015, 0.002])
 
 
 def test_a_block_is_as_wide_as_the_region_its_thing_may_be_drawn_from():
     button = replace(SCENARIO.buttons[0], name="b", position_m=(0.3, -0.2), spread_m=(0.03, 0.01))
-    box = replace(SCENARIO.boxes[0], name="x", position_m=(0.5, -0.3), spread_m=(0.02, 0.04), inner_m=(0.18, 0.12))
+    box = replace(
+        SCENARIO.boxes[0], name="x", position_m=(0.5, -0.3), spread_m=(0.02, 0.04), inner_m=(0.18, 0.12), lid=None
+    )  # fmt: skip
     inside = replace(SCENARIO.cylinders[0], name="c", inside="x", position_m=(0.01, 0.02), spread_m=(0.005, 0.006))
     alone = replace(SCENARIO.cylinders[0], name="d", inside=None, position_m=(0.1, 0.2), spread_m=(0.05, 0.06))
     scenario = replace(

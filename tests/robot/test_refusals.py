@@ -38,6 +38,7 @@ LIMITS = GateLimits(
     grip_speed_m_s=(0.25, 0.75),
     output_mask=0xFFFF,
     state_max_age_ns=50_000_000,
+    percept_max_age_ns=650_000_000,
     intent_max_age_ns=500_000_000,
 )
 REST = (0.0,) * 6

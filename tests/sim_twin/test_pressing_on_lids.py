@@ -10,11 +10,10 @@ from config.loader import resolve
 from robot.local_station import LocalStation
 from robot.messages import Heading, StepResult
 from sim_twin.bench import open_twin
-from sim_twin.scene import LEAF_THICKNESS_M
 
 RESOLVED = resolve()
 BOX = RESOLVED.scenario.boxes[0]
-LEAF_TOP_M = RESOLVED.scenario.table.height_m + BOX.height_m + LEAF_THICKNESS_M
+LEAF_TOP_M = RESOLVED.scenario.table.height_m + BOX.height_m + BOX.lid.thickness_m
 PRESSING_STEPS, RISING_STEPS = 70, 20
 PUSH_M = 0.005
 
