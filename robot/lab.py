@@ -10,13 +10,14 @@ from robot.bus.twin_link import RemoteResetter, RemoteTruth
 from robot.errors import RobotConfigError
 from robot.hal.pendant import Pendant
 from robot.hal.protocols import Resetter, SceneTruth
-from robot.local_station import LocalStation, Perceives
+from robot.local_station import LocalStation
 from robot.messages import PlantIdentity
 from robot.motion import AskedHand
 from robot.person import TerminalPerson
 from robot.person_reset import PersonLook, PersonResetter
 from robot.person_station import PersonResetStation
 from robot.servo_client import ServoClient
+from robot.station_doors import Perceives
 
 __all__ = ["build_lab_station"]
 

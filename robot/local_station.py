@@ -3,112 +3,36 @@
 from collections.abc import Callable
 from time import monotonic_ns
 from types import TracebackType
-from typing import Protocol
 
 import msgspec
 
 from config.arm import ArmConfig
 from config.rig import Rig
 from config.scenario import Scenario
+from robot.as_came import as_came
 from robot.errors import RobotConfigError, WireError
-from robot.hal.protocols import Resetter, SceneTruth
 from robot.messages import (
     ArmState,
     Executed,
     Grip,
-    GripCommand,
     Intent,
     Outcome,
     Percept,
     PlantIdentity,
-    SceneState,
     StationSpec,
     StationState,
     StepResult,
-    Vec3,
     Verdict,
 )
 from robot.motion import Hand, HandReflexes
 from robot.safety import Answer, Arming, Challenges, Lease, Reason, Tenure, draw_code
+from robot.station_doors import Loop, Perceives, World
 from robot.tick_loop import Stride
 
-__all__ = ["LocalStation", "Perceives"]
+__all__ = ["LocalStation"]
 
 WHOLE_TICKS = 1e-6
 MAX_STEP_S = 10.0
-
-
-class Perceives(Protocol):
-    """What the station needs of perception."""
-
-    def perceive(self, arm: ArmState, scene: SceneState | None) -> Percept:
-        """Return the percept at the arm's stamp."""
-        ...
-
-
-class World(Protocol):
-    """What the station needs of a plant, besides its arm."""
-
-    @property
-    def identity(self) -> PlantIdentity:
-        """Which plant this is; known when its arm is connected."""
-        ...
-
-    @property
-    def truth(self) -> SceneTruth | None:
-        """Ground truth, where there is any."""
-        ...
-
-    @property
-    def resetter(self) -> Resetter:
-        """What lays the table out."""
-        ...
-
-
-class Holder(Protocol):
-    """What holds the arm, in this process or in another."""
-
-    def connect(self) -> None:
-        """Acquire the arm. Moves nothing."""
-        ...
-
-    def engage(self) -> None:
-        """Take command of the arm, unless it is ours already."""
-        ...
-
-    @property
-    def why_lost(self) -> str | None:
-        """Why command was lost between time steps since it was taken, None where it was not."""
-        ...
-
-    def stop(self) -> None:
-        """Stop the arm and give up command."""
-        ...
-
-    def close(self) -> None:
-        """Stop and release the arm. Idempotent, never raises."""
-        ...
-
-
-class Loop(Holder, Protocol):
-    """Who holds the arm and moves it, tick by tick."""
-
-    @property
-    def is_in_contact(self) -> bool:
-        """Whether something holds the tool up."""
-        ...
-
-    def begin_epoch(self, epoch: int) -> int:
-        """Take up an epoch's rules and return the outputs it begins with."""
-        ...
-
-    def seed(self) -> ArmState:
-        """Start everything from the measured state, and return it."""
-        ...
-
-    def stride(self, intent: Intent, grip: GripCommand, *, n_ticks: int, wait_at_m: Vec3 | None = None) -> Stride:
-        """Carry out an intent for so many ticks."""
-        ...
 
 
 class LocalStation:
@@ -320,7 +244,7 @@ class LocalStation:
         stride = self._loop.stride(intent, grip, n_ticks=n_ticks, wait_at_m=self._reflexes.wait_at_m)
         if stride.verdict is not None:
             self._arming.latch(f"{stride.verdict.reason}: {stride.verdict.detail}")
-        return self._result(stride, duration if stride.is_begun else 0.0)
+        return self._result(intent, stride, duration if stride.is_begun else 0.0)
 
     def close(self) -> None:
         """Stop and release. Idempotent, never raises."""
@@ -354,7 +278,7 @@ class LocalStation:
         self._percept, self._measured = percept, state
         return percept
 
-    def _result(self, stride: Stride, duration_s: float) -> StepResult:
+    def _result(self, intent: Intent, stride: Stride, duration_s: float) -> StepResult:
         (x0, y0, z0), (x1, y1, z1) = stride.before.tcp_position_m, stride.after.tcp_position_m
         is_lost = self._reflexes.lost_object
         verdicts = () if stride.verdict is None else (stride.verdict,)
@@ -371,6 +295,8 @@ class LocalStation:
                 target_m=stride.target_m,
                 limiters=(*stride.limiters, "object_lost") if is_lost else stride.limiters,
                 limited=stride.limited,
+                requested=intent if stride.is_begun and isinstance(intent, Intent) else as_came(intent),
+                sent=stride.sent,
             ),
             verdicts=verdicts,
             is_void=is_lost or bool(verdicts),

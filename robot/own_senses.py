@@ -6,7 +6,7 @@ __all__ = ["OwnSenses"]
 
 
 class OwnSenses:
-    """Implements robot.local_station.Perceives for a person who drives: the person sees the table.
+    """Implements robot.station_doors.Perceives for a person who drives: the person sees the table.
 
     P(t) is empty: what nobody measured is not there, and is not zero.
     """

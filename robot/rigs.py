@@ -15,10 +15,11 @@ from config.rig import Rig
 from config.scenario import Scenario
 from robot.errors import RobotConfigError
 from robot.hal.protocols import Plant
-from robot.local_station import LocalStation, Perceives
+from robot.local_station import LocalStation
 from robot.motion import AskedHand
 from robot.own_senses import OwnSenses
 from robot.safety import Operator
+from robot.station_doors import Perceives
 from robot.tick_loop import TickLoop
 from robot.timed import time_world
 

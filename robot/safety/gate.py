@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable
 
+from robot.as_came import AsCame, as_came
 from robot.envelope import Envelope
 from robot.hal.protocols import Arm
 from robot.kinematics import ToolChain
@@ -73,6 +74,7 @@ class Gate:
         self._q_rad = self._q_before_rad = AT_ZERO
         self._points = chain.points(AT_ZERO)[0]
         self._intent_ns = 0
+        self._sent: ArmCommand | None = None
         self._latched: Refusal | None = None
         self._is_stop_confirmed = True
 
@@ -92,6 +94,11 @@ class Gate:
         return self._latched is not None
 
     @property
+    def sent(self) -> ArmCommand | None:
+        """The last command sent, None where none has been since `seed`."""
+        return self._sent
+
+    @property
     def next_sequence(self) -> int:
         """Number that the next command must carry."""
         return self._sequence + 1
@@ -103,6 +110,7 @@ class Gate:
         self._sequence = 0
         self._force_before_n = 0.0
         self._intent_ns = state.stamp_ns
+        self._sent = None
         self._latched = None
         if self._stops is not None:
             self._stops.seed()
@@ -113,21 +121,23 @@ class Gate:
         if refusal is None:
             self._intent_ns = now_ns
             return None
-        return self._refuse(refusal, stamp_ns=now_ns)
+        return self._refuse(refusal, stamp_ns=now_ns, refused=as_came(intent))
 
     def write(self, command: ArmCommand, state: ArmState, *, now_ns: int) -> Verdict | None:
         """Send a command, or refuse it and latch. None means it passed and was sent."""
         refusal = self._latched or self._check(command, state, now_ns)
         if refusal is not None:
-            return self._refuse(refusal, stamp_ns=now_ns)
+            return self._refuse(refusal, stamp_ns=now_ns, refused=as_came(command))
         self._q_before_rad, self._q_rad = self._q_rad, command.q_rad
         self._sequence = command.sequence
         self._arm.write(command)
+        self._sent = command
         return None
 
-    def latch(self, reason: Reason, detail: str, *, now_ns: int) -> Verdict:
-        """Latch for a reason found outside, such as a measurement that did not come."""
-        return self._refuse(Refusal(reason, detail), stamp_ns=now_ns)
+    def latch(self, reason: Reason, detail: str, *, now_ns: int, refused: ArmCommand | None = None) -> Verdict:
+        """Latch for a reason found outside, such as a measurement that did not come, or a command the arm refused."""
+        came = None if refused is None else as_came(refused)
+        return self._refuse(Refusal(reason, detail), stamp_ns=now_ns, refused=came)
 
     def _check(self, command: ArmCommand, state: ArmState, now_ns: int) -> Refusal | None:
         """Run the checks in their order. Geometry is not asked of a command that holds still."""
@@ -180,9 +190,9 @@ class Gate:
     def _parts_at(self, q_rad: Vec6 | None) -> Callable[[], Points] | None:
         return None if q_rad is None else lambda: self._chain.points(q_rad)[0]
 
-    def _refuse(self, refusal: Refusal, *, stamp_ns: int) -> Verdict:
+    def _refuse(self, refusal: Refusal, *, stamp_ns: int, refused: AsCame | None) -> Verdict:
         is_new = self._latched is None
-        verdict = self._verdict(refusal, stamp_ns)
+        verdict = self._verdict(refusal, stamp_ns, refused)
         if is_new:
             self._latched = refusal
             try:
@@ -192,7 +202,7 @@ class Gate:
                 self._is_stop_confirmed = self._arm.stop()
         return verdict
 
-    def _verdict(self, refusal: Refusal, stamp_ns: int) -> Verdict:
+    def _verdict(self, refusal: Refusal, stamp_ns: int, refused: AsCame | None) -> Verdict:
         return Verdict(
             stamp_ns=stamp_ns,
             sequence=self._sequence + 1,
@@ -201,4 +211,5 @@ class Gate:
             detail=refusal.detail,
             amount=refusal.amount,
             is_latched=True,
+            refused=refused,
         )

@@ -8,10 +8,11 @@ from robot.hal.protocols import Arm, Clock, Plant
 from robot.hal.rtde import RtdeArm
 from robot.hal.rtde_clock import RtdeClock
 from robot.hal.rtde_plant import RtdePlant
-from robot.local_station import LocalStation, Perceives
+from robot.local_station import LocalStation
 from robot.person import Person, PersonOperator, TerminalPerson
 from robot.safety import Armable, Operator
 from robot.station import Station
+from robot.station_doors import Perceives
 from robot.teleop import Device, DrivenStation
 from robot.teleop.driver import Pace, Unpaced
 from robot.teleop.gamepad import Gamepad

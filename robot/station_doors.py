@@ -1,0 +1,82 @@
+"""What a station needs of its parts: the plant, who holds its arm, and perception."""
+
+from typing import Protocol
+
+from robot.hal.protocols import Resetter, SceneTruth
+from robot.messages import ArmState, GripCommand, Intent, Percept, PlantIdentity, SceneState, Vec3
+from robot.tick_loop import Stride
+
+__all__ = ["Holder", "Loop", "Perceives", "World"]
+
+
+class Perceives(Protocol):
+    """What the station needs of perception."""
+
+    def perceive(self, arm: ArmState, scene: SceneState | None) -> Percept:
+        """Return the percept at the arm's stamp."""
+        ...
+
+
+class World(Protocol):
+    """What the station needs of a plant, besides its arm."""
+
+    @property
+    def identity(self) -> PlantIdentity:
+        """Which plant this is; known when its arm is connected."""
+        ...
+
+    @property
+    def truth(self) -> SceneTruth | None:
+        """Ground truth, where there is any."""
+        ...
+
+    @property
+    def resetter(self) -> Resetter:
+        """What lays the table out."""
+        ...
+
+
+class Holder(Protocol):
+    """What holds the arm, in this process or in another."""
+
+    def connect(self) -> None:
+        """Acquire the arm. Moves nothing."""
+        ...
+
+    def engage(self) -> None:
+        """Take command of the arm, unless it is ours already."""
+        ...
+
+    @property
+    def why_lost(self) -> str | None:
+        """Why command was lost between time steps since it was taken, None where it was not."""
+        ...
+
+    def stop(self) -> None:
+        """Stop the arm and give up command."""
+        ...
+
+    def close(self) -> None:
+        """Stop and release the arm. Idempotent, never raises."""
+        ...
+
+
+class Loop(Holder, Protocol):
+    """Who holds the arm and moves it, tick by tick."""
+
+    @property
+    def is_in_contact(self) -> bool:
+        """Whether something holds the tool up."""
+        ...
+
+    def begin_epoch(self, epoch: int) -> int:
+        """Take up an epoch's rules and return the outputs it begins with."""
+        ...
+
+    def seed(self) -> ArmState:
+        """Start everything from the measured state, and return it."""
+        ...
+
+    def stride(self, intent: Intent, grip: GripCommand, *, n_ticks: int, wait_at_m: Vec3 | None = None) -> Stride:
+        """Carry out an intent for so many ticks."""
+        ...
