@@ -9,6 +9,7 @@ import msgspec
 from config.arm import ArmConfig
 from config.rig import Rig
 from config.scenario import Scenario
+from robot.as_came import as_came
 from robot.errors import RobotConfigError, WireError
 from robot.messages import (
     ArmState,
@@ -250,7 +251,7 @@ class LocalStation:
         stride = self._loop.stride(intent, grip, n_ticks=n_ticks, wait_at_m=self._reflexes.wait_at_m, around=around)
         if stride.verdict is not None:
             self._arming.latch(f"{stride.verdict.reason}: {stride.verdict.detail}")
-        return self._result(stride, duration if stride.is_begun else 0.0)
+        return self._result(intent, stride, duration if stride.is_begun else 0.0)
 
     def close(self) -> None:
         """Stop and release. Idempotent, never raises."""
@@ -284,7 +285,7 @@ class LocalStation:
         self._percept, self._measured = percept, state
         return percept
 
-    def _result(self, stride: Stride, duration_s: float) -> StepResult:
+    def _result(self, intent: Intent, stride: Stride, duration_s: float) -> StepResult:
         (x0, y0, z0), (x1, y1, z1) = stride.before.tcp_position_m, stride.after.tcp_position_m
         is_lost = self._reflexes.lost_object
         verdicts = () if stride.verdict is None else (stride.verdict,)
@@ -302,6 +303,8 @@ class LocalStation:
                 limiters=(*stride.limiters, "object_lost") if is_lost else stride.limiters,
                 limited=stride.limited,
                 unseen=stride.unseen,
+                requested=intent if stride.is_begun and isinstance(intent, Intent) else as_came(intent),
+                sent=stride.sent,
             ),
             verdicts=verdicts,
             is_void=is_lost or bool(verdicts),

@@ -9,6 +9,8 @@ from enum import StrEnum
 
 import msgspec
 
+from robot.as_came import AsCame
+
 __all__ = [
     "ArmCommand",
     "ArmMode",
@@ -230,6 +232,8 @@ class Verdict(Message, frozen=True, kw_only=True):
     amount: float = 0.0
     """By how much, in the rule's own unit."""
     is_latched: bool = False
+    refused: AsCame | None = None
+    """The command or the intent that was refused, as it came; None where the reason lay elsewhere."""
 
 
 class Limited(Message, frozen=True, kw_only=True):
@@ -254,6 +258,10 @@ class Executed(Message, frozen=True, kw_only=True):
     """The same, each with by how much."""
     unseen: tuple[str, ...] = ()
     """Things that are not perceived now: the arm kept clear of where they were last, or of wherever they may be."""
+    requested: Intent | AsCame | None = None
+    """What was asked for: the intent itself where the gate admitted it, else whatever came."""
+    sent: ArmCommand | None = None
+    """The last command that passed the gate and was sent; None where none has been since command was taken."""
 
 
 # --------------------------------------------------------------------------------------------------- plant, station

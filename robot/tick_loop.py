@@ -45,6 +45,8 @@ class Stride(msgspec.Struct, frozen=True, kw_only=True):
     """The gate's refusal, if it refused."""
     unseen: tuple[str, ...] = ()
     """Things that were not perceived when it began."""
+    sent: ArmCommand | None = None
+    """The last command that was sent, None where none has been since command was taken."""
 
 
 def guarded(
@@ -256,6 +258,7 @@ class TickLoop:
         """Run one tick and return the gate's refusal, if it refused."""
         arm, gate = self._arm, self._gate
         now_ns = arm.clock.now_ns()
+        command: ArmCommand | None = None
         try:
             state = self._read(now_ns)
             now_ns = arm.clock.now_ns()  # on a wall clock the state read is newer than the tick's beginning
@@ -274,7 +277,8 @@ class TickLoop:
                 arm.clock.wait_tick()
                 self._read_now()
         except WireError as error:
-            return gate.latch(_reason_of(error), str(error), now_ns=now_ns)
+            untaken = None if command is gate.sent else command
+            return gate.latch(_reason_of(error), str(error), now_ns=now_ns, refused=untaken)
         return verdict
 
     def _read(self, now_ns: int) -> ArmState:
@@ -292,6 +296,7 @@ class TickLoop:
         return Stride(
             before=before, after=self.state, is_begun=is_begun, target_m=mover.target_m, limiters=mover.limiters,
             limited=mover.limited, is_in_contact=mover.is_in_contact, verdict=verdict, unseen=self._obstacles.unseen,
+            sent=self._gate.sent,
         )  # fmt: skip
 
 

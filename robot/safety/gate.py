@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable
 
+from robot.as_came import AsCame, as_came
 from robot.chain import ToolChain
 from robot.envelope import Envelope
 from robot.hal.protocols import Arm
@@ -78,6 +79,7 @@ class Gate:
         self._is_pushed = False
         self._intent_ns = 0
         self._percept_ns: int | None = None
+        self._sent: ArmCommand | None = None
         self._latched: Refusal | None = None
         self._is_stop_confirmed = True
 
@@ -97,6 +99,11 @@ class Gate:
         return self._latched is not None
 
     @property
+    def sent(self) -> ArmCommand | None:
+        """The last command sent, None where none has been since `seed`."""
+        return self._sent
+
+    @property
     def next_sequence(self) -> int:
         """Number that the next command must carry."""
         return self._sequence + 1
@@ -109,6 +116,7 @@ class Gate:
         self._force_before_n = 0.0
         self._intent_ns = state.stamp_ns
         self._percept_ns = None
+        self._sent = None
         self._latched = None
         if self._stops is not None:
             self._stops.seed()
@@ -119,7 +127,7 @@ class Gate:
         if refusal is None:
             self._intent_ns = now_ns
             return None
-        return self._refuse(refusal, stamp_ns=now_ns)
+        return self._refuse(refusal, stamp_ns=now_ns, refused=as_came(intent))
 
     def surround(self, blocks: tuple[Block, ...]) -> None:
         """Keep the arm clear of these from now on."""
@@ -134,15 +142,17 @@ class Gate:
         """Send a command, or refuse it and latch. None means it passed and was sent."""
         refusal = self._latched or self._check(command, state, now_ns)
         if refusal is not None:
-            return self._refuse(refusal, stamp_ns=now_ns)
+            return self._refuse(refusal, stamp_ns=now_ns, refused=as_came(command))
         self._course.add(command.q_rad, is_pushed=self._is_pushed)
         self._sequence = command.sequence
         self._arm.write(command)
+        self._sent = command
         return None
 
-    def latch(self, reason: Reason, detail: str, *, now_ns: int) -> Verdict:
-        """Latch for a reason found outside, such as a measurement that did not come."""
-        return self._refuse(Refusal(reason, detail), stamp_ns=now_ns)
+    def latch(self, reason: Reason, detail: str, *, now_ns: int, refused: ArmCommand | None = None) -> Verdict:
+        """Latch for a reason found outside, such as a measurement that did not come, or a command the arm refused."""
+        came = None if refused is None else as_came(refused)
+        return self._refuse(Refusal(reason, detail), stamp_ns=now_ns, refused=came)
 
     def _check(self, command: ArmCommand, state: ArmState, now_ns: int) -> Refusal | None:
         """Run the checks in their order. Of a command that holds still it is asked whether it may so soon."""
@@ -223,9 +233,9 @@ class Gate:
     def _parts_at(self, q_rad: Vec6 | None) -> Callable[[], Points] | None:
         return None if q_rad is None else lambda: self._chain.points(q_rad)[0]
 
-    def _refuse(self, refusal: Refusal, *, stamp_ns: int) -> Verdict:
+    def _refuse(self, refusal: Refusal, *, stamp_ns: int, refused: AsCame | None) -> Verdict:
         is_new = self._latched is None
-        verdict = self._verdict(refusal, stamp_ns)
+        verdict = self._verdict(refusal, stamp_ns, refused)
         if is_new:
             self._latched = refusal
             try:
@@ -235,7 +245,7 @@ class Gate:
                 self._is_stop_confirmed = self._arm.stop()
         return verdict
 
-    def _verdict(self, refusal: Refusal, stamp_ns: int) -> Verdict:
+    def _verdict(self, refusal: Refusal, stamp_ns: int, refused: AsCame | None) -> Verdict:
         return Verdict(
             stamp_ns=stamp_ns,
             sequence=self._sequence + 1,
@@ -244,4 +254,5 @@ class Gate:
             detail=refusal.detail,
             amount=refusal.amount,
             is_latched=True,
+            refused=refused,
         )

@@ -6,6 +6,7 @@ import msgspec
 import numpy as np
 import pytest
 
+from robot.as_came import as_came
 from robot.errors import NotEngagedError, RobotConfigError, SafetyError
 from robot.messages import (
     Grip,
@@ -154,6 +155,17 @@ def test_a_step_takes_its_time_and_says_what_it_did(world, engaged, resolved):
     assert moved @ (math.cos(0.5), math.sin(0.5), 0.0) > 0.03
 
 
+def test_what_was_asked_for_and_what_was_sent_last_are_both_kept(engaged):
+    station, _, _ = engaged
+    asked = go(angle=0.5)
+    for _ in range(4):
+        done = station.step(asked).executed
+        assert done.requested == asked
+    assert done.sent.sequence > 0
+    assert max(abs(a - b) for a, b in zip(done.sent.q_rad, station.measured.q_rad, strict=True)) < 0.1
+    assert station.step(Hold()).executed.sent.sequence > done.sent.sequence
+
+
 def test_the_parts_of_a_path_add_up_and_it_rests_on_the_target(engaged):
     station, _, _ = engaged
     start = np.array(station.step(go(distance=0.0)).percept.tcp_position_m)
@@ -284,6 +296,8 @@ def test_a_hostile_intent_is_refused_with_a_clear_verdict_and_moves_nothing(stan
     assert "expected" in result.verdicts[0].detail
     assert result.verdicts[0].is_latched
     assert result.is_void
+    assert result.executed.requested == as_came(intent), "what was asked for is kept as it came"
+    assert result.verdicts[0].refused is not None
     assert station.state.mode is StationMode.LATCHED
     assert reason in station.state.reason
     for _ in range(30):

@@ -7,6 +7,7 @@ from msgspec.structs import replace
 
 from config.limits import Plane
 from config.loader import load_arm
+from robot.as_came import as_came
 from robot.chain import ToolChain
 from robot.hal.fake import FakeArm
 from robot.kinematics import Kinematics
@@ -139,19 +140,35 @@ def test_a_verdict_is_whole():
     first = gate.write(bad, arm_state(START, stamp_ns=7), now_ns=7)
     assert first == Verdict(
         stamp_ns=7, sequence=2, outcome=Outcome.REFUSED, reason="joint_speed", detail=first.detail,
-        amount=first.amount, is_latched=True,
+        amount=first.amount, is_latched=True, refused=as_came(bad),
     )  # fmt: skip
     assert first.detail.startswith("joint 1: expected a change of at most ")
     assert first.amount == pytest.approx(0.25 - LIMITS.joint_step_rad[0])
-    again = gate.admit(Heading(heading_rad=0.0, distance_m=0.0, height_m=0.2), now_ns=9)
-    assert again == replace(first, stamp_ns=9)
-    later = gate.write(command(START, sequence=2), arm_state(START), now_ns=11)
-    assert later == replace(first, stamp_ns=11)
+    up = Heading(heading_rad=0.0, distance_m=0.0, height_m=0.2)
+    again = gate.admit(up, now_ns=9)
+    assert again == replace(first, stamp_ns=9, refused=as_came(up))
+    still = command(START, sequence=2)
+    later = gate.write(still, arm_state(START), now_ns=11)
+    assert later == replace(first, stamp_ns=11, refused=as_came(still))
     told = made().latch(Reason.WIRE, "the hand is gone", now_ns=13)
     assert told == Verdict(
         stamp_ns=13, sequence=1, outcome=Outcome.REFUSED, reason="wire", detail="the hand is gone", amount=0.0,
         is_latched=True,
     )  # fmt: skip
+    untaken = made().latch(Reason.ARM_REFUSED, "not taken", now_ns=13, refused=bad)
+    assert untaken.refused == as_came(bad)
+
+
+def test_the_last_command_sent_is_kept_and_a_refused_one_is_not():
+    gate = made()
+    assert gate.sent is None
+    sent = command(START)
+    assert gate.write(sent, arm_state(START), now_ns=0) is None
+    assert gate.sent is sent
+    assert gate.write(command(turned(0.25), sequence=2), arm_state(START), now_ns=0) is not None
+    assert gate.sent is sent
+    gate.seed(arm_state(START))
+    assert gate.sent is None
 
 
 @pytest.mark.parametrize("confirms", [True, False])
