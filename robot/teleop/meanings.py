@@ -26,6 +26,8 @@ MEANINGS = {
     "clearance": "the arm comes near something, slower",
     "singularity": "the arm nears a place where it loses a direction, slower",
     "no_intent": "nothing came in time, at rest",
+    "percept_age": "nothing was perceived in time, at rest",
+    "moved": "something was moved to where it would be in the way, at rest",
     "object_lost": "what the hand held slipped away",
 }
 

@@ -296,7 +296,7 @@ def test_each_limit_of_the_profile_latches_the_gate(arm, name, changes, joint, s
 
 @pytest.mark.parametrize(("force_n", "is_sent"), [(15.0, False), (math.nextafter(15.0, 16.0), True)])
 @pytest.mark.parametrize(
-    ("by_rad", "reason"), [((0.02,), Reason.JOINT_ACCELERATION), ((0.002, 0.004, 0.0062), Reason.PART_SPEED)]
+    ("by_rad", "reason"), [((0.02,), Reason.JOINT_ACCELERATION), ((0.0007, 0.0021, 0.0042, 0.0064), Reason.PART_SPEED)]
 )
 def test_only_a_command_that_something_pushes_may_give_way_faster_than_it_may_go(arm, force_n, is_sent, by_rad, reason):
     spec = FakeArm(arm=ARM, tick_s=0.01).spec
