@@ -21,10 +21,7 @@ SPEED_SHARE = 0.95
 RATE_SHARE = 0.97
 """Likewise of joints' acceleration and jerk."""
 ALIGN_RAD = 0.01
-"""A tool tilted or turned by less than this points down as far as motion cares; it is set right on the way."""
-LEAN_S = 0.15
-"""So long that takes: 0.01 rad in this time are 180 rad/s3 at the most, which leaves joints to what is asked."""
-LEAN_RAD = 1e-7
+"""A tool tilted or turned by less than this points down as far as motion cares; the next ticks set it right."""
 SWIFT_TICK_S = 0.005
 """In shorter ticks than this, a real arm's and not the twin's, the way to a new target is found one tick after it was
 set: the tick in which an intent begins has enough to do."""
@@ -80,7 +77,6 @@ class Follower:
             tick_s=tick_s,
         )
         self._joint_step_rad = tuple(SPEED_SHARE * j.speed_rad_s * tick_s for j in joints)
-        self._lean_share = tick_s / LEAN_S
         self._bounds = free_bounds(envelope, self._kinematics.chain)
         self.seed(arm.home_rad)
 
@@ -96,8 +92,6 @@ class Follower:
         self.yaw_rad = self._home_yaw_rad
         self._is_upright = self._is_solved = False
         self._to_come: list[float] | None = None
-        self._lean_rad: Vec6 | None = None
-        self._lean_at = 0.0
         self._joints.seed(list(q_rad))
         self._take_up_tool()
 
@@ -207,41 +201,18 @@ class Follower:
             self._take_target(self._to_come)
         before = self._tool.at
         now = self._slide(before, self._tool.step())
-        if now == before and self._is_solved and self._lean_rad is None:
+        if now == before and self._is_solved:
             return self.q_rad  # at rest: solving again would stir the last digits
+        self._is_solved = True
+        x, y, z, yaw = now
+        ahead = _between(self.q_before_rad, self.q_rad, 2.0)
         try:
-            if not self._is_solved:
-                self._lean(before)
-            return self._upright(now)
+            return self._kinematics.solve((x, y, z), ahead, yaw_rad=yaw)
         except UnreachableError:
             self._take_up_joints()
             self.brake()
             self.trouble = "unreachable"
             return _vec6(self._joints.step())
-
-    def _upright(self, now: list[float]) -> Vec6:
-        """Return the joints for the tool's coordinates, by as much off upright as they still lean."""
-        x, y, z, yaw = now
-        lean = self._lean_rad
-        ahead = _between(self.q_before_rad, self.q_rad, 2.0)
-        q = self._kinematics.solve((x, y, z), ahead, yaw_rad=yaw)
-        if lean is None:
-            return q
-        self._lean_at += self._lean_share
-        t = self._lean_at
-        if t >= 1.0:
-            self._lean_rad = None
-            return q
-        left = 1.0 - t * t * t * (10.0 - 15.0 * t + 6.0 * t * t)
-        return _vec6([a + left * b for a, b in zip(q, lean, strict=True)])
-
-    def _lean(self, tool: list[float]) -> None:
-        """Take up by how much the joints are off those of an upright tool; that is set right as smoothly as may be."""
-        x, y, z, yaw = tool
-        q = self._kinematics.solve((x, y, z), self.q_rad, yaw_rad=yaw)
-        self._is_solved, self._lean_at = True, 0.0
-        lean = _vec6([a - b for a, b in zip(self.q_rad, q, strict=True)])
-        self._lean_rad = lean if max(max(lean), -min(lean)) > LEAN_RAD else None
 
     def _take_target(self, target: list[float]) -> None:
         if self._is_due:
@@ -257,12 +228,9 @@ class Follower:
             return now
         self.held = name, math.dist((sx, sy, sz), (x, y, z)) / math.dist((x, y, z), before[:3])
         self._is_fenced = True
-        dt, target, speed, rate = self._tick_s, self._tool.target, self._tool.speed, self._tool.acceleration
-        ux, uy, uz = sx - x, sy - y, sz - z
-        speed = [speed[0] + ux / dt, speed[1] + uy / dt, speed[2] + uz / dt, speed[3]]
-        towards = min(0.0, rate[0] * ux + rate[1] * uy + rate[2] * uz) / (ux * ux + uy * uy + uz * uz)
-        rate = [rate[0] - towards * ux, rate[1] - towards * uy, rate[2] - towards * uz, rate[3]]
-        self._tool.seed([sx, sy, sz, yaw], speed, rate)
+        dt, target, speed = self._tick_s, self._tool.target, self._tool.speed
+        speed = [speed[0] + (sx - x) / dt, speed[1] + (sy - y) / dt, speed[2] + (sz - z) / dt, speed[3]]
+        self._tool.seed([sx, sy, sz, yaw], speed)
         self._tool.aim(target)
         return self._tool.at
 

@@ -13,7 +13,7 @@ from robot.compiled import Table, compiled
 from robot.envelope import Envelope, braking_step
 from robot.fences import fence_gap, row_of
 from robot.messages import Vec3, Vec6
-from robot.motion.holding import BRAKE_SHARE, JOINT_RESERVE, MARGIN_M, SPEED_RESERVE
+from robot.motion.holding import JOINT_RESERVE, MARGIN_M, SPEED_RESERVE, braked_step
 from robot.motion.pacing import RESERVE
 
 __all__ = ["Steps", "free_bounds", "is_free_step"]
@@ -26,12 +26,11 @@ Place = tuple[Points, float]
 
 def free_bounds(envelope: Envelope, chain: ToolChain) -> Table:
     """Return what `is_free_step` holds a step to besides joints and fences.  () -> (3, 6)"""
-    least_stop = min(end.stop_rad for end in envelope.joints)
     return np.array(
         [
             (*chain.tcp_m, *chain.elbow_m),
             (*envelope.part_step_m, envelope.fence_far_m, envelope.fence_braking_m, envelope.onset),
-            (envelope.overshoot, envelope.cone_near_cosine, least_stop, 0.0, 0.0, 0.0),
+            (envelope.overshoot, envelope.cone_near_cosine, braked_step(envelope), 0.0, 0.0, 0.0),
         ]
     )
 
@@ -72,7 +71,7 @@ def _are_parts_slow(before: Points, now: Points, to: Points, bounds: Table) -> b
 
 @compiled
 def _are_fences_far(now: Points, to: Points, fences: Table, bounds: Table, fastest: float, is_straight: bool) -> bool:
-    lost = BRAKE_SHARE * bounds[2, 2] / fastest
+    lost = bounds[2, 2] / fastest
     for k in range(fences.shape[0]):
         part, row = int(fences[k, 0]), row_of(fences, k)
         left = fence_gap(row, to[part])

@@ -14,12 +14,14 @@ from robot.compiled import Table, compiled
 from robot.envelope import Envelope, braking_step, soft_step
 from robot.fences import fence_away, fence_gap, row_of
 from robot.messages import Vec3, Vec6
+from robot.safety import Braking
 
 __all__ = [
     "MARGIN_M",
     "Met",
     "Points",
     "brake_share",
+    "braked_step",
     "led_out",
     "share_of_giving_way",
     "share_of_way",
@@ -39,6 +41,7 @@ SPEED_RESERVE = 0.99
 JOINT_RESERVE = 0.96
 BRAKE_SHARE = 0.9
 """Of what joints can brake by, so much is counted on ahead of a limit: the rest makes up for ways that bend."""
+BRAKING = Braking()
 NEAR_SPEED = 0.8
 """From this share of a part's speed on it matters how fast it grows."""
 TILT_RAD_S2 = 5.0
@@ -64,9 +67,18 @@ class Met(msgspec.Struct, frozen=True):
     """How far it may."""
 
 
+def braked_step(envelope: Envelope) -> float:
+    """Return how much of the fastest joint's step is counted on to be braked off in a tick, rad.
+
+    It is no more than what the arm's own stop takes off: the gate looks at where that would end.
+    """
+    own = BRAKE_SHARE * min([end.stop_rad for end in envelope.joints])
+    return min(own, BRAKING.deceleration_rad_s2 * envelope.tick_s * envelope.tick_s)
+
+
 def brake_share(fastest: float, envelope: Envelope) -> float:
-    """Return the share of every step that braking takes off in a tick where the fastest joint's is so long."""
-    return BRAKE_SHARE * min([end.stop_rad for end in envelope.joints]) / fastest
+    """Return the share of every step that is counted on to be braked off in a tick, the fastest joint's so long."""
+    return braked_step(envelope) / fastest
 
 
 def stretch(lost: float, envelope: Envelope) -> float:
