@@ -95,7 +95,7 @@ def test_a_box_that_is_turned_takes_all_of_its_blocks_with_it(yaw, state):
     for block in fixture_blocks(BOX, state):
         there = posed(block, (0.4, -0.1, 0.02), quat)
         expected = [rotated(tuple(c), quat) for c in corners(block).tolist()]
-        assert corners(there) == pytest.approx(np.array(expected) + (0.4, -0.1, 0.02), abs=1e-6)
+        assert corners(there) == pytest.approx(np.add(expected, (0.4, -0.1, 0.02)), abs=1e-6)
         assert (there.name, there.is_for_fingers) == (block.name, block.is_for_fingers)
 
 
@@ -103,7 +103,7 @@ def test_a_box_that_is_turned_takes_all_of_its_blocks_with_it(yaw, state):
 def test_a_region_holds_a_fixture_wherever_it_is_drawn(dx, dy, state):
     for block in fixture_blocks(BOX, state):
         region = widened(block, (0.4, -0.1, 0.02), (0.03, 0.05))
-        assert holds(region, corners(block) + (0.4 + 0.03 * dx, -0.1 + 0.05 * dy, 0.02))
+        assert holds(region, np.add(corners(block), (0.4 + 0.03 * dx, -0.1 + 0.05 * dy, 0.02)))
         assert (region.name, region.is_for_fingers) == (block.name, block.is_for_fingers)
 
 
