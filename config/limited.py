@@ -51,6 +51,8 @@ def _motion(motion: MotionLimits, profile: Profile) -> MotionLimits:
         guarded_speed_m_s=min(motion.guarded_speed_m_s, speed),
         max_step_m=min(motion.max_step_m, speed * motion.step_s),
         workspace_m=_fenced(motion.workspace_m, profile),
+        # Fingers may touch things, not the table. Motion itself stays a margin higher than this.
+        table_clearance_m=max(motion.table_clearance_m, profile.clearances.scene_m - FENCE_MARGIN_M),
         force_limit_n=min(motion.force_limit_n, force.steady_n),
         impact_limit_n=min(motion.impact_limit_n, force.blow_n),
     )

@@ -20,6 +20,8 @@ from robot.safety.checks import (
     check_joint_range,
     check_joint_speed,
     check_outputs,
+    check_percept_age,
+    check_push,
     check_sequence,
     check_state,
     check_tool,
@@ -293,3 +295,58 @@ def test_an_admitted_heading_is_finite_and_of_a_size_that_can_be_meant(heading, 
 )
 def test_intents_that_are_wrong_are_refused_and_large_ones_are_not(intent, expected):
     assert reason(check_intent(intent)) is expected
+
+
+PERCEPT_AGE = LIMITS.percept_max_age_ns
+
+
+@pytest.mark.parametrize(
+    ("age", "passes"), [(-1, False), (0, True), (PERCEPT_AGE, True), (PERCEPT_AGE + 1, False), (None, True)]
+)
+def test_motion_passes_up_to_the_age_of_a_percept_and_never_with_one_of_the_future(age, passes):
+    now_ns = 10**10
+    refusal = check_percept_age(None if age is None else now_ns - age, now_ns, LIMITS)
+    assert (refusal is None) is passes
+    assert passes or refusal.reason is Reason.STALE_PERCEPT
+
+
+SINK, RISE = (0.0, 0.0, -0.001), (0.0, 0.0, 0.001)
+JUST_OVER = math.nextafter(LIMITS.contact_n, math.inf)
+
+
+@pytest.mark.parametrize(
+    ("now_n", "before_n", "step", "passes"),
+    [
+        (STEADY, STEADY, SINK, True),
+        (math.nextafter(STEADY, math.inf), STEADY, SINK, False),
+        ((STEADY + 200.0) / 2.0, 200.0, SINK, True),
+        ((STEADY + 200.0) / 2.0 + 1e-9, 200.0, SINK, False),
+        (STEADY + 50.0, STEADY, RISE, True),
+        (STEADY + 50.0, STEADY, (0.0, 0.0, 0.0), True),
+        (STEADY + 50.0, STEADY, (0.01, 0.0, 0.0), True),
+        (STEADY, LIMITS.contact_n, SINK, True),
+        (STEADY, JUST_OVER, SINK, False),
+        (STEADY - 1.0, 2.0 * STEADY, SINK, True),
+    ],
+    ids=[
+        "at it", "next float", "rising up to it", "rising beyond", "gives way", "holds still", "slides along",
+        "a blow", "no blow any more", "falling",
+    ],
+)  # fmt: skip
+def test_a_push_that_lasts_may_not_be_pressed_on_beyond_the_limit(now_n, before_n, step, passes):
+    refusal = check_push((0.0, 0.0, now_n), before_n, step, LIMITS)
+    assert (refusal is None) is passes
+    if refusal is not None:
+        assert refusal.reason is Reason.FORCE
+        assert refusal.amount == pytest.approx(2.0 * now_n - before_n - STEADY, abs=1e-6)
+
+
+@given(
+    force=st.tuples(*[st.floats(-400.0, 400.0)] * 3), before=st.floats(0.0, 400.0),
+    step=st.tuples(*[st.floats(-0.01, 0.01)] * 3),
+)  # fmt: skip
+def test_whatever_presses_on_and_passes_is_no_harder_by_the_next_tick_than_it_may_be(force, before, step):
+    refusal = check_push(force, before, step, LIMITS)
+    if refusal is None and sum(f * s for f, s in zip(force, step, strict=True)) < 0.0 and before > LIMITS.contact_n:
+        now = math.hypot(*force)
+        assert now + max(0.0, now - before) <= LIMITS.force_max_n

@@ -131,6 +131,36 @@ def test_a_fresh_intent_lets_motion_go_on(gate):
     assert gate.write(nudge, arm_state(START, stamp_ns=late), now_ns=late) is None
 
 
+def test_motion_long_after_the_last_percept_is_refused_and_holding_still_is_not(gate):
+    late = gate.limits.percept_max_age_ns + TICK_NS
+    gate.perceive(0)
+    assert gate.write(command(START, stamp_ns=late), arm_state(START, stamp_ns=late), now_ns=late) is None
+    assert gate.admit(Heading(heading_rad=0.0, distance_m=0.01, height_m=0.2), now_ns=late) is None
+    nudge = command((START[0] + 0.001, *START[1:]), sequence=2, stamp_ns=late)
+    assert gate.write(nudge, arm_state(START, stamp_ns=late), now_ns=late).reason == Reason.STALE_PERCEPT
+
+
+def test_a_fresh_percept_lets_motion_go_on_and_none_is_asked_for_before_the_first(gate):
+    late = gate.limits.percept_max_age_ns + TICK_NS
+    intent = Heading(heading_rad=0.0, distance_m=0.01, height_m=0.2)
+    for k, perceive in enumerate((lambda: None, lambda: gate.perceive(late))):
+        perceive()
+        assert gate.admit(intent, now_ns=late) is None
+        nudge = command((START[0] + 0.001 * (k + 1), *START[1:]), sequence=k + 1, stamp_ns=late)
+        assert gate.write(nudge, arm_state(START, stamp_ns=late), now_ns=late) is None
+
+
+def test_a_push_that_rises_is_not_pressed_on_but_given_way_to(gate):
+    downwards = tuple(b - a for a, b in zip(START, Kinematics(ARM).solve((0.42, 0.0, 0.199), START), strict=True))
+    for sign, expected in ((-1.0, None), (1.0, Reason.FORCE)):
+        gate.seed(arm_state(START))
+        for k, force in enumerate((200.0, 230.0)):
+            pushed = arm_state(START, force_n=(0.0, 0.0, force), stamp_ns=k * TICK_NS)
+            q = tuple(a + sign * k * d for a, d in zip(START, downwards, strict=True))
+            verdict = gate.write(command(q, sequence=k + 1, stamp_ns=k * TICK_NS), pushed, now_ns=k * TICK_NS)
+        assert (verdict and verdict.reason) == expected
+
+
 def test_a_wrong_intent_latches_before_any_command(gate, arm):
     verdict = gate.admit(Heading(heading_rad=math.nan, distance_m=0.0, height_m=0.2), now_ns=0)
     assert verdict.reason == Reason.NOT_FINITE
