@@ -1,10 +1,12 @@
 """The last say before the arm: limits, checks, distances, stops, the gate that latches, and arming."""
 
 from robot.safety.arming import Armable, Arming, Grant, Operator, TooManyLatchesError
+from robot.safety.arming_button import ArmingButton, PressWatch
 from robot.safety.challenge import Answer, AnsweredBy, Challenges, draw_code
 from robot.safety.checks import Reason, Refusal
 from robot.safety.clearance import Clearance
 from robot.safety.collision_model import Hard
+from robot.safety.cross_check import CrossCheck
 from robot.safety.gate import Gate
 from robot.safety.lease import Lease, LeaseBook
 from robot.safety.limits import GateLimits, check_profile_fits
@@ -19,9 +21,11 @@ __all__ = [
     "AnsweredBy",
     "Armable",
     "Arming",
+    "ArmingButton",
     "Braking",
     "Challenges",
     "Clearance",
+    "CrossCheck",
     "Event",
     "Gate",
     "GateLimits",
@@ -30,6 +34,7 @@ __all__ = [
     "Lease",
     "LeaseBook",
     "Operator",
+    "PressWatch",
     "Reason",
     "Refusal",
     "StopCheck",
