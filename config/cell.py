@@ -61,6 +61,8 @@ class CellConfig(Section, frozen=True, kw_only=True):
     inputs: Annotated[tuple[CellInput, ...], Meta(min_length=1, max_length=N_SIGNALS)]
     outputs: Annotated[tuple[CellOutput, ...], Meta(min_length=1, max_length=N_SIGNALS)]
     analog_inputs: Annotated[tuple[CellAnalogInput, ...], Meta(max_length=2)] = ()
+    arming_signal: Signal | None = None
+    """Number of the input whose press arms after it was asked for; a button at the cell. None: only a console arms."""
 
 
 def pin_number(pin: str) -> int:

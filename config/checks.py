@@ -146,6 +146,8 @@ def check_cell(cell: CellConfig, file: str) -> None:
     pins = [(f"outputs[{i}].pin", wire.pin) for i, wire in enumerate(cell.outputs)]
     pins += [(f"outputs[{i}].off_pin", wire.off_pin) for i, wire in enumerate(cell.outputs) if wire.off_pin is not None]
     checker.unique(pins, "a terminal")
+    is_wired = cell.arming_signal is None or cell.arming_signal in {wire.signal for wire in cell.inputs}
+    checker.need(is_wired, "arming_signal", "the signal of one of the inputs", str(cell.arming_signal))
     checker.unique(((f"analog_inputs[{i}].pin", wire.pin) for i, wire in enumerate(cell.analog_inputs)), "a terminal")
     for i, (released, pressed) in enumerate(wire.volts for wire in cell.analog_inputs):
         got = f"{released:g} and {pressed:g}"

@@ -52,6 +52,9 @@ def check_cell_fits(scenario: Scenario, cell: CellConfig, file: str) -> None:
         for signal, what in needed.items():
             if signal not in wired:
                 raise ConfigError(file, key, f"signal {signal}, {what} of scenario {scenario.name}", "no such entry")
+    if cell.arming_signal in inputs:
+        expected = f"an input that scenario {scenario.name} does not use"
+        raise ConfigError(file, "arming_signal", expected, f"{cell.arming_signal}, {inputs[cell.arming_signal]}")
     buttons = sorted(button.input for button in scenario.buttons)
     for i, wire in enumerate(cell.analog_inputs):
         if wire.signal not in buttons:

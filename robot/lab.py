@@ -68,7 +68,7 @@ def build_lab_station(
         world = _LabWorld(loop=loop, truth=truth, resetter=by_person)
         station = PersonResetStation(
             world=world, loop=loop, perception=perception, arm=arm, scenario=resolved.scenario, rig=rig,
-            cell_shows=_pendant_of(rig),
+            cell_shows=_pendant_of(rig), arming_signal=_button_of(resolved),
         )  # fmt: skip
         station.prepare(by_person, resolved.arm.home_rad)
         return station
@@ -76,7 +76,7 @@ def build_lab_station(
     world = _LabWorld(loop=loop, truth=truth, resetter=resetter)
     return LocalStation(
         world=world, loop=loop, perception=perception, arm=arm, scenario=resolved.scenario, rig=rig,
-        hand=AskedHand(arm) if is_driven else None, cell_shows=_pendant_of(rig),
+        hand=AskedHand(arm) if is_driven else None, cell_shows=_pendant_of(rig), arming_signal=_button_of(resolved),
     )  # fmt: skip
 
 
@@ -87,9 +87,15 @@ def _driven_station(resolved: Resolved, perception: Perceives) -> LocalStation:
     return LocalStation(
         world=world, loop=loop, perception=perception, arm=arm, scenario=resolved.scenario, rig=resolved.rig,
         hand=AskedHand(arm), cell_shows=_pendant_of(resolved.rig),
+        arming_signal=_button_of(resolved),
     )  # fmt: skip
 
 
 def _pendant_of(rig: Rig) -> Pendant | None:
     """Return where a code for arming is shown: on a real arm's pendant. A virtual one has none that anybody sees."""
     return Pendant(rig.address) if rig.address is not None and rig.expected.kind == "real" else None
+
+
+def _button_of(resolved: Resolved) -> int | None:
+    """Return the input of the cell's arming button, None where it has none."""
+    return None if resolved.cell is None else resolved.cell.arming_signal

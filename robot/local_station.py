@@ -10,7 +10,7 @@ from config.arm import ArmConfig
 from config.rig import Rig
 from config.scenario import Scenario
 from robot.as_came import as_came
-from robot.errors import RobotConfigError, WireError
+from robot.errors import RobotConfigError, SafetyError, WireError
 from robot.messages import (
     ArmState,
     Executed,
@@ -25,7 +25,7 @@ from robot.messages import (
     Verdict,
 )
 from robot.motion import Hand, HandReflexes
-from robot.safety import Answer, Arming, Challenges, Lease, Reason, Tenure, draw_code
+from robot.safety import Answer, Arming, ArmingButton, Challenges, Lease, Reason, Tenure, draw_code
 from robot.station_doors import Loop, Perceives, World
 from robot.surroundings import Lookout, Surroundings
 from robot.tick_loop import Stride
@@ -58,6 +58,7 @@ class LocalStation:
         rig: Rig,
         hand: Hand | None = None,
         cell_shows: Callable[[str], None] | None = None,
+        arming_signal: int | None = None,
         host_ns: Callable[[], int] = monotonic_ns,
     ) -> None:
         """Put the parts together; nothing is connected to.
@@ -71,6 +72,7 @@ class LocalStation:
             rig: what may be armed, and how often it may latch.
             hand: decides what the fingers do; the reflexes where None.
             cell_shows: shows a text at the cell, as on the arm's pendant; None where only a console can.
+            arming_signal: input of a button at the cell that arms; None where there is none.
             host_ns: this process's monotonic time, by which leases expire and answers are late.
         """
         table_m = scenario.table.height_m
@@ -82,6 +84,7 @@ class LocalStation:
         )  # fmt: skip
         self._cell_shows = cell_shows
         self._lookout = Lookout(scenario, max_age_s=arm.motion.percept_max_age_s)
+        self._button = None if arming_signal is None else ArmingButton(signal=arming_signal, now_ns=host_ns)
         self._tenure = Tenure(arming=self._arming, profile=rig.profile, now_ns=host_ns)
         self._spec = StationSpec(
             n_distances=len(scenario.distances),
@@ -193,10 +196,29 @@ class LocalStation:
         self.connect()
         grant = self._tenure.renewed()
         code = self._arming.challenge(grant)
+        if self._button is not None:
+            self._button.ask(code)
         if self._cell_shows is None:
             return code
-        self._cell_shows(f"autotelic: to arm for {grant}, type {code}")
+        press = "" if self._button is None else "press the arming button, or "
+        self._cell_shows(f"autotelic: to arm for {grant}, {press}type {code}")
         return None
+
+    @property
+    def has_button(self) -> bool:
+        """Whether a button at the cell answers a challenge."""
+        return self._button is not None
+
+    def pressed(self) -> Answer | None:
+        """Look once at the cell's arming button, by the arm's own inputs; its press since the challenge is the answer.
+
+        Raises:
+            SafetyError: there is no such button, nothing was asked, or nobody has pressed in time.
+            WireError: the arm cannot be read.
+        """
+        if self._button is None:
+            raise SafetyError("expected a cell with an arming button (arming_signal), this one has none")
+        return self._button.see(self._loop.measure().digital_in)
 
     def arm(self, *, by: str, answer: Answer | None = None) -> None:
         """Go from disarmed to armed, if this is the plant that the rig names. For an operator."""

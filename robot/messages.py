@@ -87,6 +87,8 @@ class ArmState(Message, frozen=True, kw_only=True):
     qd_rad_s: Vec6
     tcp_position_m: Vec3
     tcp_quat: Quat
+    tcp_speed_m_s: Vec3
+    """As the arm's own controller tells it, by its own model: not worked out from the joints here."""
     tcp_force_n: Vec3
     """Force of the world on the tool, tool weight removed."""
     grip: GripState

@@ -1,6 +1,8 @@
 """A person at the terminal: is told things, presses Enter, and arms an arm that nobody else may. The edge."""
 
 import sys
+from collections.abc import Callable
+from time import sleep
 from typing import Protocol
 
 import typer
@@ -11,6 +13,9 @@ from robot.safety.arming import Armable
 from robot.safety.challenge import LIFE_NS, Answer, AnsweredBy
 
 __all__ = ["Person", "PersonOperator", "TerminalPerson"]
+
+LOOK_S = 0.01
+"""How long between two looks at the arming button."""
 
 
 class Person(Protocol):
@@ -65,12 +70,20 @@ class TerminalPerson:
 
 
 class PersonOperator:
-    """Implements robot.safety.Operator by asking: on any arm, a real one too."""
+    """Implements robot.safety.Operator by asking: on any arm, a real one too.
+
+    Where the cell has a button for it, its press is the answer, else a code that is typed.
+
+    Args:
+        person: who is asked; whoever is at the terminal where None.
+        wait: lets some seconds pass between two looks at the button.
+    """
 
     name = "person at the terminal"
 
-    def __init__(self, person: Person | None = None) -> None:
+    def __init__(self, person: Person | None = None, *, wait: Callable[[float], object] = sleep) -> None:
         self._person = TerminalPerson() if person is None else person
+        self._wait = wait
 
     def arm_once(self, station: Armable) -> None:
         """Arm and engage a disarmed station when the person says so, and answers what the cell shows."""
@@ -104,6 +117,17 @@ class PersonOperator:
     def _answer(self, station: Armable) -> Answer:
         """Let the cell ask, and the person answer. A console shows the code itself only where nothing else can."""
         code = station.challenge()
+        if station.has_button:
+            return self._await_press(station)
         shown = "the arm's pendant shows a code of digits" if code is None else f"the code is {code}"
         typed = self._person.ask(f"{shown}: type it within {LIFE_NS / 1e9:g} s")
         return Answer(typed, by=AnsweredBy.CONSOLE)
+
+    def _await_press(self, station: Armable) -> Answer:
+        """Wait until the button at the cell is pressed. Raises SafetyError where nobody presses it in time."""
+        self._person.tell(f"release the arming button at the cell and press it within {LIFE_NS / 1e9:g} s")
+        while True:
+            answer = station.pressed()
+            if answer is not None:
+                return answer
+            self._wait(LOOK_S)

@@ -98,6 +98,7 @@ def build_station(
     return LocalStation(
         world=world, loop=loop, perception=perception, arm=held, scenario=scenario, rig=rig,
         hand=AskedHand(held) if is_driven else None, cell_shows=cell_shows, host_ns=host_ns,
+        arming_signal=None if resolved.cell is None else resolved.cell.arming_signal,
     )  # fmt: skip
 
 

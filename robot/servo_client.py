@@ -22,6 +22,7 @@ from robot.servo_messages import (
     Done,
     Engage,
     Failure,
+    Measure,
     Outputs,
     Reply,
     Request,
@@ -176,6 +177,11 @@ class ServoClient:
         self.is_in_contact = False
         self._newest = self._ask(Seed(), Seeded, ANSWER_S).state
         return self._newest
+
+    def measure(self) -> ArmState:
+        """Read the arm, in command of it or not; a process that has ended is started anew. Moves nothing."""
+        self.connect()
+        return self._ask(Measure(), Seeded, ANSWER_S).state
 
     def stride(
         self,

@@ -16,6 +16,7 @@ __all__ = [
     "Done",
     "Engage",
     "Failure",
+    "Measure",
     "Outputs",
     "Reply",
     "Request",
@@ -45,6 +46,10 @@ class Seed(_Tagged, frozen=True, kw_only=True):
     """Start from the measured state, and hold it from now on; answered by Seeded."""
 
 
+class Measure(_Tagged, frozen=True, kw_only=True):
+    """Read the arm, in command of it or not; answered by Seeded."""
+
+
 class BeginEpoch(_Tagged, frozen=True, kw_only=True):
     """Take up an epoch's rules; answered by Outputs."""
 
@@ -72,7 +77,7 @@ class Close(_Tagged, frozen=True, kw_only=True):
     """Stop, release and end; answered by Done."""
 
 
-Request = Connect | Engage | Seed | BeginEpoch | StrideRequest | Stop | Close
+Request = Connect | Engage | Seed | Measure | BeginEpoch | StrideRequest | Stop | Close
 
 
 class Connected(_Tagged, frozen=True, kw_only=True):

@@ -36,6 +36,7 @@ from robot.servo_messages import (
     Done,
     Engage,
     Failure,
+    Measure,
     Outputs,
     Reply,
     Request,
@@ -262,6 +263,8 @@ class ServoServer:
                 self._loop.engage()
             case Seed():
                 return Seeded(state=self._seed())
+            case Measure():
+                return Seeded(state=self._loop.measure())
             case BeginEpoch(epoch=epoch):
                 return Outputs(bits=self._loop.begin_epoch(epoch))
             case Stop():

@@ -65,6 +65,10 @@ class Holder(Protocol):
 class Loop(Holder, Protocol):
     """Who holds the arm and moves it, tick by tick."""
 
+    def measure(self) -> ArmState:
+        """Read the arm that was acquired, in command of it or not. Moves nothing."""
+        ...
+
     @property
     def is_in_contact(self) -> bool:
         """Whether something holds the tool up."""

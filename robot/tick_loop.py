@@ -17,7 +17,18 @@ from robot.errors import ArmRefusedError, RobotConfigError, StaleStateError, Wir
 from robot.hal.protocols import Arm
 from robot.messages import ArmCommand, ArmState, GripCommand, Intent, Limited, Vec3, Verdict
 from robot.motion import Approach, Mover
-from robot.safety import Braking, Clearance, Gate, GateLimits, Hard, Obstacles, Reason, StopCheck, check_profile_fits
+from robot.safety import (
+    Braking,
+    Clearance,
+    CrossCheck,
+    Gate,
+    GateLimits,
+    Hard,
+    Obstacles,
+    Reason,
+    StopCheck,
+    check_profile_fits,
+)
 from robot.surroundings import Surroundings
 
 __all__ = ["Stride", "TickLoop", "guarded"]
@@ -77,9 +88,11 @@ def guarded(
         for kept, lead_s in ((hard, 0.0), (farther, tick_s + onset_s))
     )
     mover = Mover(config, envelope=envelope, table_m=table_m, tick_s=tick_s, approach=approach, stops=soon)
+    chain = ToolChain(config)
     gate = Gate(
-        arm=arm, limits=limits, envelope=envelope, chain=ToolChain(config), when_latched=when_latched, stops=stops
-    )
+        arm=arm, limits=limits, envelope=envelope, chain=chain, when_latched=when_latched, stops=stops,
+        cross=CrossCheck(chain),
+    )  # fmt: skip
     return mover, gate
 
 
@@ -149,6 +162,10 @@ class TickLoop:
     def connect(self) -> None:
         """Acquire the arm. Moves nothing."""
         self._arm.connect()
+
+    def measure(self) -> ArmState:
+        """Read the arm, in command of it or not. Moves nothing."""
+        return self._arm.read()
 
     def engage(self) -> None:
         """Take command of the arm, after somebody has armed it."""

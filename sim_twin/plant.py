@@ -158,6 +158,8 @@ class TwinArm:
         data, model = world.data, world.model
         self._q, self._qd = data.qpos[:6], data.qvel[:6]
         self._tcp = data.site_xpos[model.site("tcp").id]
+        tool = model.body("tool").id
+        self._twist, self._com = data.cvel[tool], data.subtree_com[int(model.body_rootid[tool])]
         self._tcp_body = data.xquat[model.body("tool").id]
         sensor = model.sensor("tool_force")
         self._force = data.sensordata[sensor.adr[0] : sensor.adr[0] + 3]
@@ -186,12 +188,23 @@ class TwinArm:
             qd_rad_s=_vec6(self._qd.tolist()),
             tcp_position_m=_vec3(self._tcp),
             tcp_quat=_quat(self._tcp_body),
+            tcp_speed_m_s=self._read_speed(),
             tcp_force_n=(0.0 - fx, 0.0 - fy, 0.0 - fz),
             grip=self._read_grip(),
             digital_in=world.table.read_inputs(),
             digital_out=world.digital_out,
             mode=ArmMode.RUNNING,
         )
+
+    def _read_speed(self) -> Vec3:
+        """Return the tool's velocity as the physics has it, of the beginning of its last step.
+
+        MuJoCo gives a body's velocity at its tree's centre of mass: v_tcp = v + w x (p_tcp - p_com).
+        """
+        wx, wy, wz, vx, vy, vz = self._twist.tolist()
+        (x, y, z), (cx, cy, cz) = self._tcp.tolist(), self._com.tolist()
+        x, y, z = x - cx, y - cy, z - cz
+        return vx + wy * z - wz * y, vy + wz * x - wx * z, vz + wx * y - wy * x
 
     def _read_grip(self) -> GripState:
         """Opening from the fingers; an object is what stalls a closing hand before its jaws meet."""

@@ -75,6 +75,8 @@ class FakeArm:
         self._is_connected = False
         self.digital_in = 0
         self.force_n: Vec3 = (0.0, 0.0, 0.0)
+        self.tcp_speed_m_s: Vec3 | None = None
+        """What it says of its tool's speed in place of the truth."""
         self.held_opening_m: float | None = None
         self.mode = ArmMode.RUNNING
         self.is_silent = False
@@ -114,6 +116,7 @@ class FakeArm:
             qd_rad_s=_vec6(self._qd),
             tcp_position_m=self._chain.tcp(q),
             tcp_quat=self._chain.quat(q),
+            tcp_speed_m_s=self.tcp_speed_m_s if self.tcp_speed_m_s is not None else self._tcp_speed(),
             tcp_force_n=self.force_n,
             grip=GripState(
                 opening_m=self._opening_m,
@@ -124,6 +127,12 @@ class FakeArm:
             digital_out=self._digital_out,
             mode=self.mode,
         )
+
+    def _tcp_speed(self) -> Vec3:
+        """Return how the tool has moved in the last tick."""
+        before = _vec6([q - self._tick_s * v for q, v in zip(self._q, self._qd, strict=True)])
+        (x1, y1, z1), (x0, y0, z0) = self._chain.tcp(_vec6(self._q)), self._chain.tcp(before)
+        return (x1 - x0) / self._tick_s, (y1 - y0) / self._tick_s, (z1 - z0) / self._tick_s
 
     @property
     def _has_object(self) -> bool:

@@ -45,7 +45,8 @@ from robot.messages import ArmCommand, ArmMode, ArmSpec, ArmState, GripState, Ve
 __all__ = ["RtdeArm"]
 
 FIELDS = (
-    "timestamp", "actual_q", "actual_qd", "actual_TCP_pose", "actual_TCP_force", "actual_digital_input_bits",
+    "timestamp", "actual_q", "actual_qd", "actual_TCP_pose", "actual_TCP_speed",
+    "actual_TCP_force", "actual_digital_input_bits",
     "actual_digital_output_bits", "robot_mode", "runtime_state", "safety_status_bits", "target_speed_fraction",
     "payload", "payload_cog",
 )  # fmt: skip
@@ -182,6 +183,7 @@ class RtdeArm:
         if modes != self._modes:
             self._modes, self._mode = modes, mode_of(*modes)
         x, y, z, rx, ry, rz = receive.getActualTCPPose()
+        vx, vy, vz, *_ = receive.getActualTCPSpeed()
         fx, fy, fz, *_ = receive.getActualTCPForce()
         return ArmState(
             stamp_ns=self._seen_ns,
@@ -189,6 +191,7 @@ class RtdeArm:
             qd_rad_s=_vec6(receive.getActualQd()),
             tcp_position_m=(x, y, z),
             tcp_quat=quat_of_rotation_vector(rx, ry, rz),
+            tcp_speed_m_s=(vx, vy, vz),
             tcp_force_n=(fx, fy, fz),
             grip=grip,
             digital_in=self._pins.signals_in(receive.getActualDigitalInputBits() & ALL_BITS),

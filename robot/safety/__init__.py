@@ -1,11 +1,13 @@
 """The last say before the arm: limits, checks, distances, stops, the gate that latches, and arming."""
 
 from robot.safety.arming import Armable, Arming, Grant, Operator, TooManyLatchesError
+from robot.safety.arming_button import ArmingButton, PressWatch
 from robot.safety.blocks import Block
 from robot.safety.challenge import Answer, AnsweredBy, Challenges, draw_code
 from robot.safety.checks import Reason, Refusal
 from robot.safety.clearance import Clearance
 from robot.safety.collision_model import Hard
+from robot.safety.cross_check import CrossCheck
 from robot.safety.gate import Gate
 from robot.safety.lease import Lease, LeaseBook
 from robot.safety.limits import GateLimits, check_profile_fits
@@ -21,10 +23,12 @@ __all__ = [
     "AnsweredBy",
     "Armable",
     "Arming",
+    "ArmingButton",
     "Block",
     "Braking",
     "Challenges",
     "Clearance",
+    "CrossCheck",
     "Event",
     "Gate",
     "GateLimits",
@@ -34,6 +38,7 @@ __all__ = [
     "LeaseBook",
     "Obstacles",
     "Operator",
+    "PressWatch",
     "Reason",
     "Refusal",
     "StopCheck",

@@ -42,6 +42,15 @@ class Armable(Protocol):
         """Let the cell show a code; return it where a console must show it, None where the cell itself does."""
         ...
 
+    @property
+    def has_button(self) -> bool:
+        """Whether a button at the cell answers a challenge."""
+        ...
+
+    def pressed(self) -> Answer | None:
+        """Look at that button; its press since the challenge is the answer. Raises SafetyError if none came in time."""
+        ...
+
     def arm(self, *, by: str, answer: Answer | None = None) -> None:
         """Go from disarmed to armed. A real arm asks for the answer to its challenge."""
         ...

@@ -79,6 +79,8 @@ class Reason(StrEnum):
     CLEARANCE = "clearance"
     STOP_RANGE = "stop_range"
     STOP_WORKSPACE = "stop_workspace"
+    KINEMATICS = "kinematics"
+    PAYLOAD = "payload"
 
 
 class Refusal(msgspec.Struct, frozen=True):

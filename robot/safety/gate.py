@@ -35,6 +35,7 @@ from robot.safety.checks_profile import (
     check_soft_margin,
 )
 from robot.safety.course import JointCourse
+from robot.safety.cross_check import CrossCheck
 from robot.safety.limits import GateLimits
 from robot.safety.plain import is_plain, plain_bounds
 from robot.safety.stop_check import StopCheck
@@ -58,6 +59,7 @@ class Gate:
         chain: ToolChain,
         when_latched: Callable[[Verdict], object] | None = None,
         stops: StopCheck | None = None,
+        cross: CrossCheck | None = None,
     ) -> None:
         """Store.
 
@@ -68,9 +70,10 @@ class Gate:
             chain: where the tool is for given joints.
             when_latched: told of the refusal that latches, before the arm is stopped: a stop takes its time.
             stops: what verifies the stop that would follow each command; None where bodies are no matter.
+            cross: what compares the controller's word with our model; None where nobody else has a say.
         """
         self._arm, self._limits, self._envelope, self._chain = arm, limits, envelope, chain
-        self._when_latched, self._stops = when_latched, stops
+        self._when_latched, self._stops, self._cross = when_latched, stops, cross
         self._sequence = 0
         self._force_before_n = 0.0
         self._course = JointCourse(envelope)
@@ -120,6 +123,8 @@ class Gate:
         self._latched = None
         if self._stops is not None:
             self._stops.seed()
+        if self._cross is not None:
+            self._cross.seed()
 
     def admit(self, intent: object, *, now_ns: int) -> Verdict | None:
         """Take note of a fresh intent. A wrong one is refused and latches; None means admitted."""
@@ -164,6 +169,7 @@ class Gate:
             or check_state(state, command, now_ns, limits)
             or check_force(force_n, self._force_before_n, limits)
             or self._check_push(command.q_rad, state)
+            or (None if self._cross is None else self._cross.check(state))
             or check_grip(command, limits)
             or check_outputs(command, limits)
         )

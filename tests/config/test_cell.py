@@ -37,6 +37,14 @@ def test_a_pulsed_drive_cannot_be_inverted(tmp_path):
         load_cell(write(tmp_path, "cell.yaml", tree))
 
 
+def test_the_arming_signal_is_one_of_the_inputs(tmp_path):
+    tree = shipped_tree("cells", "ur_box") | {"arming_signal": 15}
+    assert load_cell(write(tmp_path, "cell.yaml", tree)).arming_signal == 15
+    tree["inputs"] = tree["inputs"][:15]
+    with pytest.raises(ConfigError, match="arming_signal"):
+        load_cell(write(tmp_path, "cell.yaml", tree))
+
+
 @pytest.mark.parametrize(
     ("wires", "said"),
     [

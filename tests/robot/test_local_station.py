@@ -21,6 +21,7 @@ def fake():
 
 def test_a_push_latches_and_voids_the_step(fake):
     station, plant, _ = fake
+    station.step(Hold())
     plant.arm.force_n = (0.0, 0.0, 300.0)
     result = station.step(go())
     assert result.is_void

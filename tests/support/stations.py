@@ -50,18 +50,21 @@ def arm_state(
     stamp_ns: int = 0,
     tcp_m: Vec3 = (0.42, 0.0, 0.2),
     force_n: Vec3 = (0.0, 0.0, 0.0),
+    speed_m_s: Vec3 = (0.0, 0.0, 0.0),
+    qd_rad_s: Vec6 = (0.0,) * 6,
     grip: GripState = STILL,
     digital_in: int = 0,
     digital_out: int = 0,
     mode: ArmMode = ArmMode.RUNNING,
 ) -> ArmState:
-    """Return a measurement at rest."""
+    """Return a measurement, at rest unless said otherwise."""
     return ArmState(
         stamp_ns=stamp_ns,
         q_rad=q_rad,
-        qd_rad_s=(0.0,) * 6,
+        qd_rad_s=qd_rad_s,
         tcp_position_m=tcp_m,
         tcp_quat=(0.0, 1.0, 0.0, 0.0),
+        tcp_speed_m_s=speed_m_s,
         tcp_force_n=force_n,
         grip=grip,
         digital_in=digital_in,
