@@ -85,6 +85,8 @@ def _struct(asked: inspect.Type) -> inspect.StructType:
 
 
 def _item(asked: inspect.Type, index: int) -> inspect.Type:
+    if isinstance(asked, inspect.UnionType):
+        asked = next(m for m in asked.types if isinstance(m, inspect.TupleType | inspect.VarTupleType))
     if isinstance(asked, inspect.TupleType):
         return asked.item_types[index]
     assert isinstance(asked, inspect.VarTupleType)

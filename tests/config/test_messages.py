@@ -46,6 +46,7 @@ TYPES = [
     case("truth for a number", "rig", ["tick_s"], True, "tick_s", "a number from 0.002 up to 0.05", "True"),
     case("number for truth", "learning", ["goal_selection", "rearm"], 1, "goal_selection.rearm", "true or false", "1"),
     case("fraction for a whole", "scenario", ["buttons", 0, "input"], 0.5, "buttons[0].input", "a whole number", "0.5"),
+    case("word in a list that may be absent", "scenario", ["workspace_m"], [[0.3, -0.4, "low"], [0.6, 0.4, 0.3]], "workspace_m[0][2]", "a number", "'low'"),
     case("mapping for a list", "scenario", ["goals"], {}, "goals", "a list of at least 1", "a mapping"),
     case("list for a mapping", "arm", ["servo"], [1], "servo", "a mapping", "a list of 1"),
     case("nothing", "arm", ["servo"], None, "servo", "a mapping", "nothing"),
