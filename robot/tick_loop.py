@@ -37,6 +37,9 @@ WHOLE_TICKS = 1e-6
 AHEAD_M = 0.004
 """How much farther from bodies than the gate refuses joints begin to brake; their targets rest at twice that."""
 
+LEAF_M = 0.012
+"""How far motion keeps fingers off leaves that stand; the gate lets them touch. Fingers are the fastest there is."""
+
 
 class Stride(msgspec.Struct, frozen=True, kw_only=True):
     """What one time step of the loop came to."""
@@ -78,8 +81,9 @@ def guarded(
     hard = Hard(own_m=clear.self_m, table_m=clear.scene_m, thing_m=clear.scene_m)
     envelope = Envelope.of(profile, config, tick_s=tick_s)
     limits = GateLimits.of(config, arm.spec, table_m=table_m, tick_s=tick_s)
-    approach = Approach(config, Clearance(config, scenario, hard=hard), braking=braking)
-    farther = hard.farther(AHEAD_M)
+    shaped = msgspec.structs.replace(hard, leaf_m=LEAF_M)
+    approach = Approach(config, Clearance(config, scenario, hard=shaped), braking=braking)
+    farther = shaped.farther(AHEAD_M)
     onset_s = max(joint.acceleration_rad_s2 / joint.jerk_rad_s3 for joint in config.joints)
     stops, soon = (
         StopCheck(

@@ -15,7 +15,8 @@ from config.resolved import Resolved
 from robot.bench import BenchReport, BenchResult, bench_report
 from robot.description import write_mjcf
 from robot.messages import ArmCommand, GripCommand, Heading, Hold, Intent, JointTarget, Twist, Vec6
-from robot.safety import Clearance, Hard
+from robot.safety import Clearance, Hard, Obstacles
+from robot.surroundings import Place, Surroundings
 from robot.tick_loop import guarded
 from sim_twin.plant import TwinPlant
 
@@ -71,6 +72,7 @@ class _Drive:
             profile=resolved.profile,
             when_latched=None,
         )
+        self._obstacles = Obstacles(resolved.scenario)
         self._clearance = Clearance(resolved.arm, resolved.scenario, hard=Hard())
         self._bare = _bare_solve(resolved)
         self._grip = GripCommand(opening_m=tool.stroke_m, force_n=tool.grip_force_n, speed_m_s=tool.speed_m_s[1])
@@ -84,6 +86,10 @@ class _Drive:
         self._state = self._arm.read()
         self._gate.seed(self._state)
         self._mover.seed(self._state)
+        self._obstacles.seed(self._state.digital_out, self._state.stamp_ns)
+        self._obstacles.perceive(_perceived(self._plant))
+        self._mover.surround(self._obstacles.blocks)
+        self._gate.surround(self._obstacles.blocks)
         self._n_left = 0
 
     def decide(self, costs: Costs) -> None:
@@ -129,6 +135,14 @@ class _Drive:
         self._bare()
         costs.distance_us.append((middle - begin) / 1e3)
         costs.bare_us.append((perf_counter_ns() - middle) / 1e3)
+
+
+def _perceived(plant: TwinPlant) -> Surroundings:
+    """Return what a perception that sees everything would hand down with a time step."""
+    assert plant.truth is not None, "a twin has one"
+    scene = plant.truth.read()
+    places = tuple(Place(position_m=thing.position_m, quat=thing.quat) for thing in scene.objects)
+    return Surroundings(stamp_ns=scene.stamp_ns, places=places)
 
 
 def measure(resolved: Resolved, *, n_decisions: int, seed: int) -> Costs:

@@ -2,9 +2,10 @@
 
 import pytest
 import yaml
+from msgspec.structs import replace
 
 from config.errors import ConfigError
-from config.limited import limited
+from config.limited import FENCE_MARGIN_M, limited
 from config.loader import load_arm, load_limits, load_resolved, resolve, with_rig
 from config.resolved import dump_resolved
 from tests.support.config_files import shipped_tree, write
@@ -104,7 +105,10 @@ def test_a_workspace_that_the_scenario_names_must_be_inside_the_profiles(tmp_pat
 
 def test_unattended_leaves_the_shipped_arm_as_it_is_and_attended_slows_its_tool():
     limits = load_limits(NAME)
-    assert limited(ARM, limits.profile("unattended")) == ARM
+    held = limits.profile("unattended")
+    left = limited(ARM, held)
+    assert replace(left, motion=replace(left.motion, table_clearance_m=ARM.motion.table_clearance_m)) == ARM
+    assert left.motion.table_clearance_m == pytest.approx(held.clearances.scene_m - FENCE_MARGIN_M)
     slowed = limited(ARM, limits.profile("attended")).motion
     assert max(slowed.speed_m_s, slowed.guarded_speed_m_s, slowed.max_step_m / slowed.step_s) < 0.25
 
