@@ -1,6 +1,6 @@
 """The last say before the arm: limits, checks, distances, stops, the gate that latches, and arming."""
 
-from robot.safety.arming import Armable, Arming, Grant, Operator, TooManyLatchesError
+from robot.safety.arming import Armable, Arming, Buttoned, Grant, Operator, TooManyLatchesError
 from robot.safety.arming_button import ArmingButton, PressWatch
 from robot.safety.challenge import Answer, AnsweredBy, Challenges, draw_code
 from robot.safety.checks import Reason, Refusal
@@ -23,6 +23,7 @@ __all__ = [
     "Arming",
     "ArmingButton",
     "Braking",
+    "Buttoned",
     "Challenges",
     "Clearance",
     "CrossCheck",
