@@ -1,6 +1,6 @@
 """The last say before the arm: limits, checks, distances, stops, the gate that latches, and arming."""
 
-from robot.safety.arming import Armable, Arming, Grant, Operator, TooManyLatchesError
+from robot.safety.arming import Armable, Arming, Buttoned, Grant, Operator, TooManyLatchesError
 from robot.safety.arming_button import ArmingButton, PressWatch
 from robot.safety.blocks import Block
 from robot.safety.challenge import Answer, AnsweredBy, Challenges, draw_code
@@ -26,6 +26,7 @@ __all__ = [
     "ArmingButton",
     "Block",
     "Braking",
+    "Buttoned",
     "Challenges",
     "Clearance",
     "CrossCheck",

@@ -11,7 +11,7 @@ from robot.messages import PlantIdentity, PlantKind, StationMode, StationState
 from robot.safety.challenge import Answer, Challenges
 from robot.safety.states import Event, next_mode
 
-__all__ = ["Armable", "Arming", "Grant", "Operator", "TooManyLatchesError"]
+__all__ = ["Armable", "Arming", "Buttoned", "Grant", "Operator", "TooManyLatchesError"]
 
 
 class Grant(msgspec.Struct, frozen=True, kw_only=True):
@@ -25,7 +25,20 @@ class Grant(msgspec.Struct, frozen=True, kw_only=True):
         return f"{self.source} under lease {self.lease}, profile {self.profile}"
 
 
-class Armable(Protocol):
+class Buttoned(Protocol):
+    """What may have a button at its cell."""
+
+    @property
+    def has_button(self) -> bool:
+        """Whether a button at the cell answers a challenge."""
+        ...
+
+    def pressed(self) -> Answer | None:
+        """Look at that button; its press since the challenge is the answer. Raises SafetyError if none came in time."""
+        ...
+
+
+class Armable(Buttoned, Protocol):
     """What an operator may do with a station."""
 
     @property
@@ -40,15 +53,6 @@ class Armable(Protocol):
 
     def challenge(self) -> str | None:
         """Let the cell show a code; return it where a console must show it, None where the cell itself does."""
-        ...
-
-    @property
-    def has_button(self) -> bool:
-        """Whether a button at the cell answers a challenge."""
-        ...
-
-    def pressed(self) -> Answer | None:
-        """Look at that button; its press since the challenge is the answer. Raises SafetyError if none came in time."""
         ...
 
     def arm(self, *, by: str, answer: Answer | None = None) -> None:

@@ -17,24 +17,28 @@ from sim_twin.checking.report import CheckReport, MutationReport, as_json, draw,
 from sim_twin.checking.ring import StreamResult
 from sim_twin.checking.tally import Tally
 
-__all__ = ["check_rig"]
+__all__ = ["check_rig", "measured"]
 
 
 def check_rig(resolved: Resolved, wanted: Wanted) -> Answer:
     """Check a twin's rig and return what is to be shown of it."""
-    profile = resolved.profile
-    setup = Setup(
-        resolved=resolved, profile=profile, seed=wanted.seed,
-        n_commands=wanted.n_commands or N_COMMANDS,
-    )  # fmt: skip
     if wanted.mutate:
         return _mutate(resolved, wanted)
+    report = measured(resolved, wanted)
+    return Answer(json=as_json(report), shown=shown(report), is_passed=report.is_passed)
+
+
+def measured(resolved: Resolved, wanted: Wanted) -> CheckReport:
+    """Run the streams that are wanted, keep report and figure where that is asked for, and return the report."""
+    setup = Setup(
+        resolved=resolved, profile=resolved.profile, seed=wanted.seed, n_commands=wanted.n_commands or N_COMMANDS
+    )
     begin = perf_counter()
     tally = _one(setup, wanted.stream) if wanted.stream is not None else _many(setup, wanted)
     report = _report(setup, tally, wanted, seconds=perf_counter() - begin)
     if wanted.out is not None:
         _keep(setup, report, wanted.out)
-    return Answer(json=as_json(report), shown=shown(report), is_passed=report.is_passed)
+    return report
 
 
 def _one(setup: Setup, number: int) -> Tally:
