@@ -12,6 +12,7 @@ from learning.experts import ExpertSet
 from learning.goal_selector import GoalSelector
 from learning.goals import GoalJudge
 from learning.seeds import named_generator
+from learning.stops import Stops, stops_of
 from learning.stopwatch import Stopwatch
 from learning.subgoal_selector import make_subgoal_selector
 from robot.messages import PlantIdentity, StationSpec
@@ -38,11 +39,17 @@ class RobotLearner:
         # One small network at a time: more threads cost more than they bring, and the number would change the sums.
         torch.set_num_threads(1)
         station = build_station(resolved, heard_by=None if stopwatch is None else stopwatch.lap, pictures=pictures)
+        self._local = station
         self.station = OperatedStation(station, build_operator(resolved.rig))
         self.station.connect()
         self.identity: PlantIdentity = station.identity
         self.model_sha256: str | None = station.model_sha256
         self.agent = build_agent(resolved, self.station.spec, seed=seed, stopwatch=stopwatch)
+
+    @property
+    def stops(self) -> Stops:
+        """What stopped the arm so far."""
+        return stops_of(self._local.latch_reasons, n_epochs=self.station.n_resets)
 
     def close(self) -> None:
         """Release the station. Idempotent."""

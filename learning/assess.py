@@ -2,6 +2,8 @@
 
 from collections.abc import Callable
 
+import msgspec
+
 from config.loader import with_rig
 from learning.assembly import RobotLearner
 from learning.checkpoint import taking_up
@@ -12,9 +14,10 @@ from learning.graph import Graph
 from learning.metrics import graph_errors, reachable_states
 from learning.rows import EvaluationRow
 from learning.run_folder import RunFolder
+from learning.stops import Stops
 from robot.oracle import rules_oracle
 
-__all__ = ["assess", "beliefs_of"]
+__all__ = ["Assessed", "assess", "beliefs_of"]
 
 
 def beliefs_of(folder: RunFolder) -> tuple[Explanation, ...]:
@@ -35,6 +38,15 @@ def beliefs_of(folder: RunFolder) -> tuple[Explanation, ...]:
     return explain_graph(graph)
 
 
+class Assessed(msgspec.Struct, frozen=True, kw_only=True):
+    """What a test came to."""
+
+    rows: tuple[EvaluationRow, ...]
+    """One a goal."""
+    stops: Stops
+    """What stopped the arm meanwhile."""
+
+
 def assess(
     folder: RunFolder,
     *,
@@ -43,7 +55,7 @@ def assess(
     rules_epoch: int | None,
     rig: str | None = None,
     tell: Callable[[str], object] = lambda _: None,
-) -> list[EvaluationRow]:
+) -> Assessed:
     """Return a row a goal: learning off, the newest checkpoint, from fresh table layouts.
 
     Args:
@@ -86,13 +98,15 @@ def assess(
             scores.append(run_test(learner.agent, learner.station, test, when_tested=heard))
         predicted = learnt_graph(learner.agent)
     finally:
+        stops = learner.stops
         learner.close()
     graph: list[tuple[int, int] | None] = [None] * n_goals
     if predicted is not None:
         states = reachable_states(lambda goal, latched: oracle(goal, latched, epoch), n_goals)
         wrong = graph_errors(predicted, lambda goal, latched: oracle(goal, latched, epoch), states, n_goals)
         graph = [(len(states), n) for n in wrong]
-    return [evaluation_row(test, score, entry) for test, score, entry in zip(tests, scores, graph, strict=True)]
+    rows = tuple(evaluation_row(test, score, entry) for test, score, entry in zip(tests, scores, graph, strict=True))
+    return Assessed(rows=rows, stops=stops)
 
 
 class _Count:

@@ -136,11 +136,13 @@ def evaluate(
     folder = RunFolder(run)
     goals = [goal.name for goal in folder.manifest().goals]
     with Status(f"testing {len(goals)} goals, {tests} epochs each", now_s=perf_counter) as status:
-        rows = assess(folder, n_tests=tests, seed=seed, rules_epoch=rules_epoch, rig=rig, tell=status)
+        assessed = assess(folder, n_tests=tests, seed=seed, rules_epoch=rules_epoch, rig=rig, tell=status)
+    rows, stops = assessed.rows, assessed.stops
     if json:
-        typer.echo(msgspec.json.encode({"goals": goals, "rows": rows}).decode())
+        typer.echo(msgspec.json.encode({"goals": goals, "rows": rows, "stops": stops.as_tree()}).decode())
     else:
         Console().print(score_table(rows, goals))
+        typer.echo(stops.line())
 
 
 @_one_line_errors
@@ -193,7 +195,10 @@ def _report(runs: Sequence[Run], folder: Path, *, json: bool) -> None:
     if json:
         typer.echo(msgspec.json.encode(report_of(groups)).decode())
         return
-    Console().print(report_table(report_of(groups)))
+    told = report_of(groups)
+    Console().print(report_table(told))
+    for path, stops in told.stops:
+        typer.echo(f"{path}: {stops.line()}")
     for path in paths:
         typer.echo(path)
 

@@ -12,6 +12,7 @@ from learning.metrics import EraSummary, Summary, summarise
 from learning.rows import EvaluationRow, GoalRow
 from learning.run_folder import Manifest, RunFolder
 from learning.run_search import find_runs
+from learning.stops import Stops
 
 __all__ = [
     "Count",
@@ -39,6 +40,8 @@ class Run(msgspec.Struct, frozen=True, kw_only=True):
     goal_rows: tuple[GoalRow, ...]
     evaluation_rows: tuple[EvaluationRow, ...]
     summary: Summary
+    stops: Stops | None = None
+    """What stopped the arm; None where that was not kept."""
 
 
 class Loaded(msgspec.Struct, frozen=True, kw_only=True):
@@ -121,6 +124,10 @@ class Report(msgspec.Struct, frozen=True, kw_only=True):
     groups: tuple[GroupReport, ...]
     runs: tuple[tuple[str, Summary], ...]
     """Folder and figures of each run."""
+    stops: tuple[tuple[str, Stops], ...] = ()
+    """Folder of each run that kept them, and what stopped its arm."""
+    protective_per_1000_epochs: float | None = None
+    """Protective stops of all of them in a thousand epochs; None where none kept any."""
 
 
 def load_run(folder: RunFolder) -> Run:
@@ -151,6 +158,7 @@ def load_run(folder: RunFolder) -> Run:
         goal_rows=tuple(goal_rows),
         evaluation_rows=tuple(evaluation_rows),
         summary=summary,
+        stops=folder.stops(),
     )
 
 
@@ -213,9 +221,14 @@ def group_runs(runs: Sequence[Run]) -> list[Group]:
 
 def report_of(groups: Sequence[Group]) -> Report:
     """Return the figures of all groups."""
+    kept = [(run.folder, run.stops) for group in groups for run in group.runs if run.stops is not None]
     return Report(
         groups=tuple(_report_group(group) for group in groups),
         runs=tuple((run.folder, run.summary) for group in groups for run in group.runs),
+        stops=tuple(kept),
+        protective_per_1000_epochs=sum((stops for _, stops in kept), Stops()).protective_per_1000_epochs
+        if kept
+        else None,
     )
 
 

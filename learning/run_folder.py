@@ -14,14 +14,16 @@ from config.resolved import Resolved
 from learning.checkpoint import CheckpointStore, write_atomically
 from learning.errors import RunFolderError
 from learning.rows import EvaluationRow, GoalRow, GraphRow, TrialRow, read_rows
+from learning.stops import Stops
 from learning.time_spent import TimeSpent
 
-__all__ = ["CONFIG_NAME", "FORMAT", "MANIFEST_NAME", "PROFILE_NAME", "GoalInfo", "Manifest", "RunFolder"]
+__all__ = ["CONFIG_NAME", "FORMAT", "MANIFEST_NAME", "PROFILE_NAME", "STOPS_NAME", "GoalInfo", "Manifest", "RunFolder"]
 
 FORMAT = 1
 CONFIG_NAME = "config.yaml"
 MANIFEST_NAME = "run.json"
 PROFILE_NAME = "profile.json"
+STOPS_NAME = "stops.json"
 
 Share = Annotated[float, Meta(ge=0.0, le=1.0)]
 
@@ -116,6 +118,13 @@ class RunFolder:
         except (OSError, msgspec.DecodeError, UnicodeDecodeError):
             return TimeSpent()
 
+    def stops(self) -> Stops | None:
+        """Return what stopped the arm in the sessions so far; None where that is not known."""
+        try:
+            return msgspec.json.decode((self.path / STOPS_NAME).read_bytes(), type=Stops)
+        except (OSError, msgspec.DecodeError, UnicodeDecodeError):
+            return None
+
     def trials(self) -> list[TrialRow]:
         """Return one row a trial."""
         return read_rows(self.path / "trials.csv", TrialRow)
@@ -174,6 +183,10 @@ class RunFolder:
     def keep_time_spent(self, spent: TimeSpent) -> None:
         """Write where the time of all sessions went."""
         self.write_json(PROFILE_NAME, spent.as_tree())
+
+    def keep_stops(self, stops: Stops) -> None:
+        """Write what stopped the arm in all sessions."""
+        self.write_json(STOPS_NAME, stops.as_tree())
 
     def write_json(self, name: str, value: msgspec.Struct | dict[str, object]) -> None:
         """Write one JSON file, indented."""

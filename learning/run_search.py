@@ -5,7 +5,7 @@ from pathlib import Path
 import msgspec
 
 from learning.errors import RunFolderError
-from learning.run_folder import CONFIG_NAME, MANIFEST_NAME, PROFILE_NAME, RunFolder
+from learning.run_folder import CONFIG_NAME, MANIFEST_NAME, PROFILE_NAME, STOPS_NAME, RunFolder
 from learning.tables import TABLES
 
 __all__ = ["Found", "find_runs"]
@@ -13,7 +13,7 @@ __all__ = ["Found", "find_runs"]
 NEEDED = (MANIFEST_NAME, CONFIG_NAME)
 OF_A_RUN = (MANIFEST_NAME, *(f"{name}.csv" for name in TABLES), "checkpoints")
 """What only a run leaves."""
-PERHAPS_OF_A_RUN = (CONFIG_NAME, PROFILE_NAME, "summary.json")
+PERHAPS_OF_A_RUN = (CONFIG_NAME, PROFILE_NAME, STOPS_NAME, "summary.json")
 """What a run leaves, and other things are called too: a report has a summary."""
 
 

@@ -11,6 +11,7 @@ from learning.experiment import Experiment, Plan
 from learning.progress import Progress
 from learning.provenance import manifest_of
 from learning.run_folder import Manifest, RunFolder
+from learning.stops import Stops
 from learning.stopwatch import Stopwatch
 from learning.tables import Tables
 from learning.time_spent import TimeSpent
@@ -55,6 +56,12 @@ class Session:
         manifest, state = self.manifest, self.state
         learner = self._learner
         before = self._folder.time_spent() if self.n_done else TimeSpent()
+        stopped = (self._folder.stops() if self.n_done else None) or Stops()
+
+        def keep() -> None:
+            self._folder.keep_time_spent(before + self._spent(progress))
+            self._folder.keep_stops(stopped + learner.stops)
+
         self._stopwatch.lap("start-up")
         pool = EvaluationPool(
             tester=build_agent(self._resolved, learner.station.spec, seed=manifest.seed),
@@ -74,7 +81,7 @@ class Session:
                 watcher=progress,
                 oracle=rules_oracle(self._resolved),
                 stopwatch=self._stopwatch,
-                when_kept=lambda: self._folder.keep_time_spent(before + self._spent(progress)),
+                when_kept=keep,
             )
             if state is not None:
                 experiment.restore(state)
@@ -82,7 +89,7 @@ class Session:
         spent = before
         if n_done > self.n_done:
             spent += self._spent(progress)
-            self._folder.keep_time_spent(spent)
+            keep()
         return Ended(n_done=n_done, n_epochs=manifest.n_epochs, spent=spent)
 
     def _spent(self, progress: Progress) -> TimeSpent:

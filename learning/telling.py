@@ -25,6 +25,8 @@ def summary_lines(run: Run) -> Iterator[str]:
     )
     for i, era in enumerate(summary.eras):
         yield f"  {_era_line(era, is_first=i == 0)}"
+    if run.stops is not None:
+        yield f"  {run.stops.line()}"
 
 
 def _era_line(era: EraSummary, *, is_first: bool) -> str:

@@ -40,7 +40,7 @@ def success_rows(run: Path, *, rig: Path, n_tests: int) -> list[BenchResult]:
         goals = [goal.name for goal in folder.manifest().goals]
         console.print(f"{len(goals)} goals, {n_tests} test epochs each, 4 to 8 s a test epoch")
         with Status("connecting", now_s=perf_counter, console=console) as status:
-            rows = assess(folder, n_tests=n_tests, seed=None, rules_epoch=None, rig=str(rig), tell=status)
+            rows = assess(folder, n_tests=n_tests, seed=None, rules_epoch=None, rig=str(rig), tell=status).rows
     except (LearningError, ConfigError) as error:
         raise typer.BadParameter(str(error), param_hint="RUN") from error
     return success_results(rows, goals)

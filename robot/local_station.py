@@ -158,6 +158,11 @@ class LocalStation:
         """How often the station has latched since it was made."""
         return self._arming.n_latches
 
+    @property
+    def latch_reasons(self) -> tuple[str, ...]:
+        """Why it has latched since it was made, oldest first."""
+        return tuple(self._arming.reasons)
+
     def connect(self) -> None:
         """Acquire the plant. Moves nothing. Idempotent."""
         if not self._is_connected:
@@ -293,9 +298,14 @@ class LocalStation:
         self._arming.require_engaged()
 
     def _seed(self) -> Percept:
-        """Start everything from the measured state."""
-        state = self._loop.seed()
-        percept = self._perceive(state)
+        """Start everything from the measured state. Where nothing is known of arm or table, stop and latch."""
+        try:
+            state = self._loop.seed()
+            percept = self._perceive(state)
+        except WireError as error:
+            self._loop.stop()
+            self._arming.latch(f"{Reason.STALE_STATE.value}: {error}")
+            raise
         self._reflexes.reset(percept)
         return percept
 

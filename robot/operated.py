@@ -3,6 +3,7 @@
 from types import TracebackType
 from typing import Protocol
 
+from robot.errors import NotEngagedError, WireError
 from robot.messages import Intent, Percept, StationMode, StationSpec, StationState, StepResult
 from robot.safety import Armable, Operator
 from robot.station import Station
@@ -15,7 +16,11 @@ class _ArmableStation(Station, Armable, Protocol):
 
 
 class OperatedStation:
-    """Implements robot.station.Station for long unattended runs where no hardware is attached."""
+    """Implements robot.station.Station for long unattended runs where no hardware is attached.
+
+    Attributes:
+        n_resets: How often the table was laid out for an epoch.
+    """
 
     def __init__(self, station: _ArmableStation, operator: Operator | None) -> None:
         """Store both.
@@ -26,6 +31,7 @@ class OperatedStation:
         """
         self._station = station
         self._operator = operator
+        self.n_resets = 0
 
     def connect(self) -> None:
         """Arm the station, if there is an operator and it is not armed yet."""
@@ -45,13 +51,24 @@ class OperatedStation:
     def reset(self, *, seed: int, epoch: int) -> Percept:
         """Lay the table out for an epoch; after a latch the operator first resets the plant and arms again.
 
+        So too where the arm is lost while the table is laid out: that is no other loss than one in an epoch.
+
         Raises:
             NotEngagedError: nobody has armed the station, or it is latched and there is no operator.
+            WireError: the plant cannot be laid out.
             TooManyLatchesError: it has latched more often than it may.
         """
-        if self._operator is not None and self._station.state.mode is StationMode.LATCHED:
-            self._operator.rearm(self._station, seed=seed, epoch=epoch)
-        return self._station.reset(seed=seed, epoch=epoch)
+        while True:
+            try:
+                if self._operator is not None and self._station.state.mode is StationMode.LATCHED:
+                    self._operator.rearm(self._station, seed=seed, epoch=epoch)
+                percept = self._station.reset(seed=seed, epoch=epoch)
+            except (NotEngagedError, WireError):
+                if self._operator is None or self._station.state.mode is not StationMode.LATCHED:
+                    raise
+            else:
+                self.n_resets += 1
+                return percept
 
     def step(self, intent: Intent, *, duration_s: float | None = None) -> StepResult:
         """Carry out an intent for one time step."""

@@ -85,6 +85,8 @@ class ServoClient:
         """It crossed a time step on the way, which will be refused."""
         self._why_lost: str | None = None
         self._newest: ArmState | None = None
+        self._n_strides = 0
+        """Asked for since the arm was seeded."""
         self._epoch = 0
         """Whose rules are in force, in a process that takes over from one that has ended too."""
         self._encode = msgspec.msgpack.Encoder().encode
@@ -112,6 +114,11 @@ class ServoClient:
     def pid(self) -> int | None:
         """The process's number, None while there is none."""
         return None if self._process is None else self._process.pid
+
+    @property
+    def pipe(self) -> Connection | None:
+        """What leads to the process, for whoever checks what it makes of a station gone wrong; None without one."""
+        return self._connection
 
     def connect(self) -> None:
         """Start the process, where none runs, and let it acquire the arm. Moves nothing.
@@ -175,6 +182,7 @@ class ServoClient:
     def seed(self) -> ArmState:
         """Start everything from the measured state, and return it."""
         self.is_in_contact = False
+        self._n_strides = 0
         self._newest = self._ask(Seed(), Seeded, ANSWER_S).state
         return self._newest
 
@@ -199,16 +207,18 @@ class ServoClient:
         Raises:
             NotEngagedError: there was none already, or nobody has seeded it.
         """
-        request = StrideRequest(
-            intent=pack_intent(intent), grip=grip, n_ticks=n_ticks, wait_at_m=wait_at_m, around=around
-        )
         if self._connection is None or self._newest is None:
             raise NotEngagedError("servo process: expected one that holds the arm; connect, engage and seed it")
         self._overhear()
         told, self._told = self._told, None
         try:
             if told is None:
-                told = self._ask(request, StrideReply, n_ticks * self._tick_s + STRIDE_SLACK_S)
+                self._n_strides += 1
+                request = StrideRequest(
+                    intent=pack_intent(intent), grip=grip, n_ticks=n_ticks, sequence=self._n_strides,
+                    wait_at_m=wait_at_m, around=around,
+                )  # fmt: skip
+                told = self._exchange(request, StrideReply, n_ticks * self._tick_s + STRIDE_SLACK_S)
         except WireError as error:
             return _cut_short(self._newest, str(error))
         stride = told.stride
@@ -248,6 +258,14 @@ class ServoClient:
             RobotError: what the process raised, by its name; or it hangs, or is gone.
         """
         self._overhear()
+        return self._exchange(request, expected, timeout_s)
+
+    def _exchange(self, request: Request, expected: type[R], timeout_s: float) -> R:
+        """Ask without listening first: a time step does so itself, once, and says what it heard in place of asking.
+
+        Listening here again, as it once did, kept what was said in between for later, and asked a process that had
+        latched by then: its refusal ended the run.
+        """
         if self._connection is None:
             raise NotEngagedError("servo process: expected one that runs, it has ended; connect and engage again")
         if self._is_leaving:

@@ -1,8 +1,9 @@
 """What crosses the pipe between a station and its servo process."""
 
-from typing import Any
+from typing import Annotated, Any
 
 import msgspec
+from msgspec import Meta
 
 from robot.messages import ArmState, GripCommand, Intent, PlantIdentity, Vec3
 from robot.surroundings import Surroundings
@@ -62,7 +63,9 @@ class StrideRequest(_Tagged, frozen=True, kw_only=True):
     intent: msgspec.Raw
     """As pack_intent makes it: whatever was asked for crosses, for it is the gate that refuses it."""
     grip: GripCommand
-    n_ticks: int
+    n_ticks: Annotated[int, Meta(ge=1)]
+    sequence: int
+    """One more than that of the time step before, from 1 on since the arm was seeded."""
     wait_at_m: Vec3 | None = None
     """Where the tool waits for the hand, base frame; None where it need not wait."""
     around: Surroundings | None = None
@@ -131,11 +134,20 @@ def pack_intent(intent: object) -> msgspec.Raw:
 
 
 def unpack_intent(packed: msgspec.Raw) -> Any:  # noqa: ANN401 - what is no intent is told by the gate
-    """Return the intent that crossed; what is none comes as plain values, which the gate refuses."""
+    """Return the intent that crossed; what is none comes as plain values or as None, which the gate refuses."""
     try:
         return _intent_of(packed)
     except msgspec.ValidationError:
+        return _plain(packed)
+    except (ValueError, RecursionError):
+        return None
+
+
+def _plain(packed: msgspec.Raw) -> Any:  # noqa: ANN401 - whatever it is
+    try:
         return msgspec.msgpack.decode(packed)
+    except (ValueError, RecursionError):
+        return None
 
 
 _intent_of = msgspec.msgpack.Decoder(Intent).decode

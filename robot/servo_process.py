@@ -5,6 +5,9 @@ station takes to decide bends no path; meanwhile the arm goes on to where the la
 an intent may be, the arm is brought to rest and held there. So the controller's watchdog is fed by commands that passed
 the gate, and by nothing else.
 
+Whoever has been silent for twice as long after a time step's end was frozen, or is too slow for the arm: what it asks
+for next was decided on what has passed, so it is refused and latches, as does what comes out of order or is no request.
+
 When the pipe to its station closes it stops the arm and ends. After a loss of the arm it ends too, at once where
 nothing is known of the arm any more, whatever it was about, or where a stop was not confirmed: the client library must
 never get the chance to reconnect and go on by itself. What latched is told before the arm is stopped, for a stop takes
@@ -17,6 +20,7 @@ import signal
 import sys
 from collections.abc import Callable, MutableSequence
 from multiprocessing.connection import Connection
+from time import monotonic_ns
 
 import msgspec
 
@@ -55,8 +59,12 @@ __all__ = ["ServoServer", "serve"]
 BEGIN_S = 0.01
 """How far into a time step its intent begins, at most half of it: as long as a station may take to decide. One that
 takes longer shifts a corner by the tool's speed times the rest."""
+SILENT_AGES = 2
+"""How often an intent's greatest age a station may be silent after a time step's end before it is believed no more."""
 IDLE_S = 0.002
 """How long a process that is not in command waits for a request at a time."""
+MOST_BYTES = 65_536
+"""A request has some hundred: what says that it is longer is none, and nothing after it can be told apart."""
 LOST = Reason.STALE_STATE.value
 """Nothing is known of the arm: nothing more may be said to its client."""
 ENDING_REASONS = (LOST, Reason.ARM_REFUSED.value, Reason.WIRE.value)
@@ -149,6 +157,7 @@ class ServoServer:
         pulse: shared memory of one number: ticks so far while it ticks, otherwise 0.
         die: ends the process on the spot.
         pin: keeps this thread on a CPU of its own while it is in command.
+        host_ns: the host's monotonic time, by which a station is silent; the arm's own says how old an intent is.
     """
 
     def __init__(
@@ -161,17 +170,21 @@ class ServoServer:
         pulse: MutableSequence[int],
         die: Callable[[], object],
         pin: CpuPin,
+        host_ns: Callable[[], int] = monotonic_ns,
     ) -> None:
-        self._cpu = pin
+        self._cpu, self._host_ns = pin, host_ns
         self._connection, self._plant, self._loop, self._tool = connection, plant, loop, arm.tool
         self._intent_max_age_ns = round(arm.motion.intent_max_age_s * 1e9)
+        self._silent_ns = SILENT_AGES * self._intent_max_age_ns
         self._begin_ticks = round(BEGIN_S * plant.arm.spec.rate_hz)
         self._pulse, self._die = pulse, die
         self._decode = msgspec.msgpack.Decoder(Request).decode
         self._encode = msgspec.msgpack.Encoder().encode
         self._is_in_command = self._is_over = self._is_beginning = False
         self._grip: GripCommand | None = None
-        self._n_left = self._n_over = self._n_ticks = self._intent_ns = 0
+        self._n_left = self._n_over = self._n_ticks = self._intent_ns = self._sequence = 0
+        self._answered_ns: int | None = None
+        """When the last time step ended, host's time; None where there was none since the arm was seeded."""
         self._is_resting = True
 
     def run(self) -> None:
@@ -181,7 +194,7 @@ class ServoServer:
             if is_ticking:
                 self._tick()
             while not self._is_over and self._connection.poll(0.0 if is_ticking else IDLE_S):
-                self._answer(self._decode(self._connection.recv_bytes()))
+                self._take(self._connection.recv_bytes(MOST_BYTES))
                 is_ticking = True
 
     def latched(self, verdict: Verdict) -> None:
@@ -195,6 +208,20 @@ class ServoServer:
             self._die()
         self._is_over = verdict.reason in ENDING_REASONS
 
+    def _take(self, raw: bytes) -> None:
+        """Answer what came; what is no request latches where there is anything to latch."""
+        try:
+            request = self._decode(raw)
+        except (ValueError, RecursionError) as error:
+            detail = f"expected a request, came {len(raw)} bytes that are none: {error}"
+            if self._is_in_command:
+                self._loop.latch(Reason.MALFORMED, detail)
+                self._end_unless_stopped()
+            else:
+                self._send(Failure(kind=WireError.__name__, message=detail))
+            return
+        self._answer(request)
+
     def _tick(self) -> None:
         assert self._grip is not None, "seeding sets it"
         verdict = self._loop.tick(self._grip)
@@ -206,7 +233,7 @@ class ServoServer:
         if self._n_left:
             self._n_left -= 1
             if not self._n_left:
-                self._n_over = 0
+                self._n_over, self._answered_ns = 0, self._host_ns()
                 self._send(StrideReply(stride=self._loop.report(None, is_begun=True)))
         else:
             self._n_over += 1
@@ -228,7 +255,7 @@ class ServoServer:
             self._die()
 
     def _begin_stride(self, request: StrideRequest) -> None:
-        n_ticks = request.n_ticks
+        n_ticks, asked_ns, heard_ns = request.n_ticks, self._now_ns(), self._host_ns()
         if self._is_resting:
             self._n_over = 0
         while self._is_in_command and self._n_over < min(self._begin_ticks, n_ticks // 2):
@@ -238,14 +265,29 @@ class ServoServer:
             return
         self._grip = request.grip
         self._is_beginning = True
-        intent = unpack_intent(request.intent)
-        verdict = self._loop.begin(intent, n_ticks=n_ticks, wait_at_m=request.wait_at_m, around=request.around)
+        verdict = self._untimely(request.sequence, heard_ns) or self._loop.begin(
+            unpack_intent(request.intent), n_ticks=n_ticks, wait_at_m=request.wait_at_m, around=request.around
+        )
         self._is_beginning = False
         if verdict is None:
             self._n_left = max(n_ticks - self._n_over, n_ticks - n_ticks // 2)
-            self._intent_ns, self._is_resting = self._now_ns(), False
+            self._intent_ns, self._is_resting = asked_ns, False
         else:
             self._end_unless_stopped()
+
+    def _untimely(self, sequence: int, heard_ns: int) -> Verdict | None:
+        """Latch for what is out of order, or comes after a silence; None where it is neither."""
+        expected, self._sequence = self._sequence + 1, sequence
+        if sequence != expected:
+            return self._loop.latch(Reason.SEQUENCE, f"expected time step {expected}, came {sequence}")
+        silent_ns = 0 if self._answered_ns is None else heard_ns - self._answered_ns
+        if silent_ns <= self._silent_ns:
+            return None
+        return self._loop.latch(
+            Reason.STALE_INTENT,
+            f"expected the next intent within {self._silent_ns / 1e6:.0f} ms of a time step's end, it came after "
+            f"{silent_ns / 1e6:.0f} ms: whoever commands was frozen, or is too slow",
+        )
 
     def _end_unless_stopped(self) -> None:
         """End at once after a latch whose stop was not confirmed."""
@@ -278,6 +320,7 @@ class ServoServer:
         return Done()
 
     def _seed(self) -> ArmState:
+        self._sequence, self._answered_ns = 0, None
         state = self._loop.seed()
         opening_m = min(max(state.grip.opening_m, 0.0), self._tool.stroke_m)
         self._grip = GripCommand(

@@ -1,6 +1,7 @@
 """What runs each tick of an arm: read, cell, motion, gate, wait. Knows nothing of percepts, reflexes or arming."""
 
 from collections.abc import Callable
+from math import isfinite
 
 import msgspec
 
@@ -259,6 +260,8 @@ class TickLoop:
         verdict = self._gate.admit(intent, now_ns=now_ns)
         if verdict is not None:
             return verdict
+        if wait_at_m is not None and not all(map(isfinite, wait_at_m)):
+            return self.latch(Reason.NOT_FINITE, f"expected a place to wait at, came {wait_at_m}")
         if around is not None:
             self.perceive(around)
             if now_ns - around.stamp_ns > self._percept_max_age_ns:
@@ -270,6 +273,10 @@ class TickLoop:
         else:
             self._mover.wait_at(wait_at_m, before)
         return None
+
+    def latch(self, reason: Reason, detail: str) -> Verdict:
+        """Stop the arm and latch, for a reason that was found outside."""
+        return self._gate.latch(reason, detail, now_ns=self._arm.clock.now_ns())
 
     def rest(self) -> None:
         """Come to rest and stay there: what ticks do when the last intent is too old."""

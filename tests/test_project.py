@@ -21,7 +21,7 @@ ROOMS = ("config", "learning", "perception", "robot", "sim_twin")
 EDGES = {
     "agent", "assembly", "assess", "bench", "checkpoint", "cli", "consent", "ended", "errors", "evaluation",
     "evaluation_pool", "experiment", "explain", "figures", "goals", "metrics", "progress", "provenance", "report",
-    "robot_hours", "rows", "run_folder", "run_search", "seeds", "session", "stopwatch", "tables",
+    "robot_hours", "rows", "run_folder", "run_search", "seeds", "session", "stops", "stopwatch", "tables",
     "telling", "time_spent", "wanted", "wired",
 }  # fmt: skip
 """Modules of learning that hold nothing learnt: what runs the learner, judges it, keeps it or tells of it."""

@@ -49,7 +49,7 @@ class RemoteTruth:
         """Return the newest truth, stamped with this host's monotonic time.
 
         Raises:
-            StaleStateError: none came within the last 100 ms.
+            StaleStateError: none came within the last 100 ms, or what came last is none: nothing is known then.
         """
         newest = self._newest
         if newest is None:
@@ -58,7 +58,13 @@ class RemoteTruth:
         age_ns = monotonic_ns() - stamp_ns
         if age_ns > TRUTH_AGE_NS:
             raise StaleStateError(f"twin/truth: expected a message each 10 ms, the newest is {age_ns / 1e6:.0f} ms old")
-        return msgspec.structs.replace(self._decode(raw), stamp_ns=stamp_ns)
+        try:
+            scene = self._decode(raw)
+        except (ValueError, RecursionError) as error:
+            raise StaleStateError(
+                f"twin/truth: expected a SceneState, came {len(raw)} bytes of none: {error}"
+            ) from error
+        return msgspec.structs.replace(scene, stamp_ns=stamp_ns)
 
 
 class _Stops(Protocol):

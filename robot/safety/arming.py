@@ -96,7 +96,7 @@ class Arming:
     """The mode of one station, by the table of robot.safety.states. Pure state: touches no plant.
 
     Attributes:
-        n_latches: How often the station has latched since it was made.
+        reasons: Why the station has latched since it was made, oldest first.
     """
 
     def __init__(
@@ -120,7 +120,7 @@ class Arming:
         self._reason = ""
         self._grant: Grant | None = None
         self._is_plant_reset = False
-        self.n_latches = 0
+        self.reasons: list[str] = []
 
     @property
     def state(self) -> StationState:
@@ -132,6 +132,11 @@ class Arming:
             source="" if grant is None else grant.source,
             profile="" if grant is None else grant.profile,
         )
+
+    @property
+    def n_latches(self) -> int:
+        """How often the station has latched since it was made."""
+        return len(self.reasons)
 
     @property
     def is_engaged(self) -> bool:
@@ -202,7 +207,7 @@ class Arming:
         self._reason = reason
         self._is_plant_reset = False
         self._latched_at.append(self._n_resets)
-        self.n_latches += 1
+        self.reasons.append(reason)
 
     def note_plant_reset(self) -> None:
         """The plant was reset: a latch may now be cleared by an operator. Clears nothing itself."""

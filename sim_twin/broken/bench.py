@@ -5,8 +5,8 @@ from time import perf_counter
 from robot.bench import BenchReport, BenchResult, bench_report
 from sim_twin.broken.course import Course
 from sim_twin.broken.outcome import Outcome
-from sim_twin.broken.rider import CutShortError, DisturbedError
 from sim_twin.broken.trials import TRIALS, Trial
+from sim_twin.broken.tries import CutShortError, DisturbedError
 
 __all__ = ["bench_faults"]
 

@@ -11,17 +11,16 @@ from robot.errors import RobotError
 from sim_twin.broken.judge import Judged, Motion
 from sim_twin.broken.outcome import Outcome
 from sim_twin.broken.pendant import Pendant
-from sim_twin.broken.rider import NEVER_S, CutShortError, DisturbedError, Raised, Rider
+from sim_twin.broken.rider import NEVER_S, Raised, Rider
 from sim_twin.broken.trials import JOG_RAD, Moment, Stage, Trial
+from sim_twin.broken.tries import DisturbedError, in_peace
 from sim_twin.controller.process import ControllerProcess, ask_fault
 from sim_twin.controller.server import Setup
-from sim_twin.paired.machine import SPARE_SHARE, Spare
 
 __all__ = ["Course"]
 
 BORNE_S = 1.5
 SETTLE_S, AFTER_S, REST_LIMIT_S = 0.3, 0.5, 8.0
-N_TRIES = 6
 
 
 def is_ended(pid: int) -> bool:
@@ -58,22 +57,13 @@ class Course:
             DisturbedError: it did so each time, and this machine was busy elsewhere.
             CutShortError: it did so each time on a machine that had time to spare: no disturbance explains it.
         """
-        n_spared, told = 0, []
-        while len(told) < N_TRIES and 2 * n_spared <= N_TRIES:
-            spare = Spare().begin()
-            try:
-                outcome = self._try(trial)
-            except DisturbedError as error:
-                why = str(error)
-            else:
-                if outcome.again is None:
-                    return outcome
-                why = f"did not move again: {outcome.again.what}"
-            share = spare.share()
-            n_spared += share >= SPARE_SHARE
-            told.append(f"{why} ({share:.0%} of the processors' time to spare)")
-        error = CutShortError if 2 * n_spared > N_TRIES else DisturbedError
-        raise error(f"{trial.name}: {'; '.join(told)}")
+        return in_peace(trial.name, lambda: self._moved_again(trial))
+
+    def _moved_again(self, trial: Trial) -> Outcome:
+        outcome = self._try(trial)
+        if outcome.again is not None:
+            raise DisturbedError(f"did not move again: {outcome.again.what}")
+        return outcome
 
     def _try(self, trial: Trial) -> Outcome:
         trace = Path(self._folder.name) / "trace"

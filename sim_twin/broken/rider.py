@@ -10,14 +10,13 @@ import msgspec
 from config.loader import resolve
 from config.resolved import Resolved
 from robot.errors import RobotError
-from robot.messages import ArmState, GripCommand, Twist
+from robot.messages import ArmState, GripCommand
 from robot.servo_client import ServoClient
+from sim_twin.broken.shuttle import Shuttle
+from sim_twin.broken.tries import DisturbedError
 
-__all__ = ["CutShortError", "DisturbedError", "Raised", "Rider", "wire_rig"]
+__all__ = ["Raised", "Rider", "wire_rig"]
 
-SPEED_M_S = 0.35
-REACH_M = 0.16
-"""The tool goes to and fro between these, left and right of the middle."""
 STEP_TICKS = 20
 NEVER_S = 3.0
 """A backend that has said nothing for so long does not notice."""
@@ -42,14 +41,6 @@ def _beside(
     raised = do()
     thread.join()
     return happened[0], raised
-
-
-class DisturbedError(RuntimeError):
-    """Something came up before anything was made to go wrong: this machine was busy elsewhere for too long."""
-
-
-class CutShortError(RuntimeError):
-    """Something came up that nothing was made to go wrong for, and this machine was not busy."""
 
 
 class Raised(msgspec.Struct, frozen=True, kw_only=True):
@@ -83,7 +74,7 @@ class Rider:
         self.client = ServoClient(self._resolved)
         tool = self._resolved.arm.tool
         self._grip = GripCommand(opening_m=tool.stroke_m, force_n=tool.grip_force_n, speed_m_s=tool.speed_m_s[1])
-        self._way = 1.0
+        self._shuttle = Shuttle()
 
     def __enter__(self) -> Self:
         return self
@@ -104,17 +95,13 @@ class Rider:
 
     def step(self) -> Raised | None:
         """Move on for a time step; return what came up, if anything did."""
-        intent = Twist(linear_m_s=(0.0, self._way * SPEED_M_S, 0.0))
         try:
-            came = self.client.stride(intent, self._grip, n_ticks=STEP_TICKS)
+            came = self.client.stride(self._shuttle.intent, self._grip, n_ticks=STEP_TICKS)
         except RobotError as error:
             return Raised(at_s=monotonic(), what=type(error).__name__, detail=str(error))
         if came.verdict is not None:
             return Raised(at_s=monotonic(), what=came.verdict.reason, detail=came.verdict.detail)
-        y = came.after.tcp_position_m[1]
-        if abs(y) > REACH_M and y * self._way > 0.0:
-            self._way = -self._way
-        self._y_m = y
+        self._shuttle.note(came.after.tcp_position_m)
         return None
 
     def ride(self, seconds: float) -> Raised | None:
@@ -158,7 +145,7 @@ class Rider:
 
     def _get_under_way(self) -> None:
         raised = self.ride(0.6)
-        while raised is None and not (abs(self._y_m) < REACH_M / 2 and self._y_m * self._way < 0.0):
+        while raised is None and not self._shuttle.is_midway:
             raised = self.step()
         if raised is not None:
             raise DisturbedError(f"before anything went wrong: {raised}")

@@ -21,7 +21,7 @@ from robot.cli import app
 from tests.support.toy_folder import make_toy_folder
 
 TABLES = ("evaluations.csv", "goals.csv", "graphs.csv", "trials.csv")
-FILES = ("config.yaml", "profile.json", "run.json", "summary.json", *TABLES)
+FILES = ("config.yaml", "profile.json", "run.json", "stops.json", "summary.json", *TABLES)
 
 
 def autotelic(*arguments):

@@ -2,6 +2,7 @@
 
 import pytest
 
+from robot.errors import NotEngagedError, StaleStateError
 from robot.messages import ArmMode, Grip, GripState, Heading, Hold, StationMode
 from tests.support.stations import engaged as engage_fake
 from tests.support.stations import fake_rig
@@ -45,6 +46,23 @@ def test_an_arm_that_falls_silent_latches_and_voids_the_step(fake):
     assert result.is_void
     assert result.verdicts[0].reason == "stale_state"
     assert plant.arm.n_stops > 0
+
+
+def test_a_table_that_cannot_be_seen_when_the_arm_is_taken_latches_it(fake, monkeypatch):
+    station, plant, _ = fake
+    n_stops = plant.arm.n_stops
+
+    def blind():
+        raise StaleStateError("no truth")
+
+    with monkeypatch.context() as dark:
+        dark.setattr(plant.truth, "read", blind)
+        with pytest.raises(StaleStateError):
+            station.reset(seed=1, epoch=1)
+    assert station.state.mode is StationMode.LATCHED
+    assert plant.arm.n_stops > n_stops
+    with pytest.raises(NotEngagedError, match="no truth"):
+        station.step(go())
 
 
 def test_a_held_object_that_is_lost_voids_the_step_without_latching(fake):

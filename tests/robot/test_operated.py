@@ -49,6 +49,49 @@ def test_a_reset_after_a_latch_is_the_reset_that_would_have_been(resolved):
     assert again.distances_m == expected.distances_m
 
 
+class Losing:
+    """A resetter in whose hands the arm is lost so many times."""
+
+    def __init__(self, station, n_losses):
+        self._station, self._reset, self.n_left = station, station._world.resetter.reset, n_losses
+
+    def __call__(self, **asked):
+        self._reset(**asked)
+        if self.n_left:
+            self.n_left -= 1
+            self._station._arming.latch("lost while the table was laid out")
+
+
+def losing(resolved, monkeypatch, n_losses):
+    station = build_station(resolved)
+    monkeypatch.setattr(station._world.resetter, "reset", Losing(station, n_losses))
+    return station
+
+
+def test_an_arm_that_is_lost_while_the_table_is_laid_out_is_armed_again(resolved, monkeypatch):
+    station = losing(resolved, monkeypatch, 1)
+    with OperatedStation(station, build_operator(resolved.rig)) as operated:
+        operated.reset(seed=1, epoch=0)
+        assert (operated.state.mode, station.n_latches) == (StationMode.ENGAGED, 1)
+        assert not operated.step(Hold()).is_void
+
+
+def test_an_arm_that_is_lost_at_every_reset_fails_the_run(resolved, monkeypatch):
+    station = losing(resolved, monkeypatch, 10**6)
+    with (
+        OperatedStation(station, build_operator(resolved.rig)) as operated,
+        pytest.raises(TooManyLatchesError, match="laid out"),
+    ):
+        operated.reset(seed=1, epoch=0)
+
+
+def test_a_reset_without_an_operator_arms_nothing_again(resolved, monkeypatch):
+    station = losing(resolved, monkeypatch, 1)
+    build_operator(resolved.rig).arm_once(station)
+    with station, pytest.raises(NotEngagedError, match="laid out"):
+        OperatedStation(station, None).reset(seed=1, epoch=0)
+
+
 def test_too_many_latches_fail_the_run(resolved):
     with OperatedStation(build_station(resolved), build_operator(resolved.rig)) as station:
         for epoch in range(resolved.rig.max_latches + 1):

@@ -65,7 +65,7 @@ def test_the_arm_goes_on_between_time_steps_until_the_intent_is_too_old_and_not_
     for _ in range(6):
         server.stride(AHEAD, n_ticks=N_TICKS)
     led_to_m = server.loop.report(None, is_begun=True).target_m
-    age_ticks, n_left = round(fake_rig().arm.motion.intent_max_age_s / fake_rig().rig.tick_s), N_TICKS - 1
+    age_ticks, n_left = round(fake_rig().arm.motion.intent_max_age_s / fake_rig().rig.tick_s), N_TICKS
     for _ in range(n_left, age_ticks - 1):
         before_m = server.loop.state.tcp_position_m
         after_m = server.wait(1).tcp_position_m

@@ -124,7 +124,7 @@ def test_an_arm_lost_in_a_time_step_is_told_as_its_end(served):
     grip = GripCommand(opening_m=0.085, force_n=20.0, speed_m_s=0.15)
     intent = Heading(heading_rad=0.0, distance_m=0.01, height_m=0.2)
     served.ours.send_bytes(
-        msgspec.msgpack.encode(StrideRequest(intent=pack_intent(intent), grip=grip, n_ticks=1_000_000))
+        msgspec.msgpack.encode(StrideRequest(intent=pack_intent(intent), grip=grip, n_ticks=1_000_000, sequence=1))
     )
     assert not served.ours.poll(0.05)
     served.fail(StaleStateError("no state"))
@@ -150,6 +150,29 @@ def test_a_latch_that_crosses_a_time_step_on_the_way_answers_it_once(served, mon
         assert came.verdict.reason == "arm_mode"
         served.plant.arm.mode = ArmMode.RUNNING
         assert client.seed().mode is ArmMode.RUNNING  # and the refusal of the time step is not taken for this answer
+    assert isinstance(served.ask(Close()), Done)
+
+
+@pytest.mark.parametrize("n_deaf", [0, 1, 2])
+def test_a_latch_is_told_as_what_it_is_however_late_it_is_heard(served, monkeypatch, n_deaf):
+    """It came between two looks at the pipe, and the time step was asked for all the same: its refusal ended a run."""
+    client = ServoClient(fake_rig())
+    client._connection = served.ours
+    client.seed()
+    served.plant.arm.mode = ArmMode.PROTECTIVE_STOP
+    assert served.ours.poll(WAIT_S)
+    hear, heard = served.ours.poll, []
+
+    def deaf(timeout_s):
+        heard.append(timeout_s)
+        return hear(timeout_s) if timeout_s or len(heard) > n_deaf else False
+
+    monkeypatch.setattr(served.ours, "poll", deaf, raising=False)
+    grip = GripCommand(opening_m=0.085, force_n=20.0, speed_m_s=0.15)
+    came = client.stride(Heading(heading_rad=0.0, distance_m=0.01, height_m=0.2), grip, n_ticks=1)
+    assert came.verdict.reason == "arm_mode"
+    served.plant.arm.mode = ArmMode.RUNNING
+    assert client.seed().mode is ArmMode.RUNNING
     assert isinstance(served.ask(Close()), Done)
 
 

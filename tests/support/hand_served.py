@@ -1,12 +1,14 @@
 """A servo process's server that ticks when it is told to: what happens between time steps, without a wall clock."""
 
+from collections.abc import Callable
 from multiprocessing import Pipe
+from time import monotonic_ns
 
 import msgspec
 
 from config.resolved import Resolved
 from robot.hal.protocols import Plant
-from robot.messages import ArmState, GripCommand, Intent
+from robot.messages import ArmState, GripCommand, Intent, Vec3
 from robot.realtime import CpuPin
 from robot.servo_messages import (
     BeginEpoch,
@@ -31,13 +33,14 @@ class HandServed:
     Args:
         resolved: the rig.
         plant: what it drives.
+        host_ns: the host's time, by which a station is silent.
 
     Attributes:
         loop: its loop.
         server: the server.
     """
 
-    def __init__(self, resolved: Resolved, plant: Plant) -> None:
+    def __init__(self, resolved: Resolved, plant: Plant, *, host_ns: Callable[[], int] = monotonic_ns) -> None:
         self.plant = plant
         self._ours, theirs = Pipe()
         tool = resolved.arm.tool
@@ -48,13 +51,15 @@ class HandServed:
         )  # fmt: skip
         self.server = ServoServer(
             connection=theirs, plant=plant, loop=self.loop, arm=resolved.arm, pulse=[0], die=lambda: None,
-            pin=CpuPin(0),
+            pin=CpuPin(0), host_ns=host_ns,
         )  # fmt: skip
+        self._n_asked = 0
         self._ask(Connect())
         self._ask(Engage())
 
     def seed(self) -> None:
         """Start from the measured state."""
+        self._n_asked = 0
         self._ask(Seed())
 
     def begin_epoch(self, epoch: int) -> int:
@@ -70,9 +75,20 @@ class HandServed:
             self.server._tick()
         return self.loop.state
 
+    def request(self, intent: Intent, *, n_ticks: int, wait_at_m: Vec3 | None = None) -> StrideRequest:
+        """Return the next time step's request."""
+        self._n_asked += 1
+        return StrideRequest(
+            intent=pack_intent(intent), grip=self._grip, n_ticks=n_ticks, sequence=self._n_asked, wait_at_m=wait_at_m
+        )
+
     def begin(self, intent: Intent, *, n_ticks: int) -> None:
         """Ask for a time step; its ticks follow by `wait`."""
-        self.server._answer(StrideRequest(intent=pack_intent(intent), grip=self._grip, n_ticks=n_ticks))
+        self.send(msgspec.msgpack.encode(self.request(intent, n_ticks=n_ticks)))
+
+    def send(self, raw: bytes) -> None:
+        """Let bytes come through the pipe."""
+        self.server._take(raw)
 
     def stride(self, intent: Intent, *, n_ticks: int, n_decided: int = 0) -> Stride:
         """Carry out a time step that the station took so many ticks to decide on."""

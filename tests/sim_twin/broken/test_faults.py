@@ -9,11 +9,11 @@ import pytest
 
 from sim_twin.broken import TRIALS, Course, CutShortError, DisturbedError
 from sim_twin.paired.machine import Spare
-from tests.support.overbooked import OVERBOOKED_SHARE, Overbooked
+from tests.support.judged_course import JudgedCourse
+from tests.support.overbooked import Overbooked
 
 pytestmark = pytest.mark.realtime
 
-N_TRIES, LEAST_JUDGED = 3, 0.75
 ESSENTIAL = ("interfaces_frozen_1s", "servo_process_hung_and_jogged", "rtde_dropped")
 REASONS = {
     "link": "stale_state",
@@ -27,53 +27,6 @@ REASONS = {
 }
 
 
-class Bench:
-    """A course, and which of its faults came to a verdict."""
-
-    def __init__(self, course):
-        self.course, self.tried, self.judged = course, [], []
-        self._whole = Overbooked()
-
-    def run(self, trial):
-        """Return an outcome that is as asked; fail at the first that is not on a machine that was not overbooked."""
-        self.tried.append(trial.name)
-        told = []
-        while len(told) < N_TRIES:
-            overbooked = Overbooked()
-            outcome, wrong = self._outcome(trial)
-            if not wrong:
-                self.judged.append(trial.name)
-                return outcome
-            share = overbooked.share()
-            told.append(f"{wrong} (somebody waited for a processor {share:.0%} of the time)")
-            if share < OVERBOOKED_SHARE:
-                self.judged.append(trial.name)
-                pytest.fail(f"{trial.name}: {'; '.join(told)}")
-            if outcome is None:
-                break  # a course that is disturbed has begun anew often enough by itself
-        pytest.skip(f"{trial.name} was not judged, this machine was overbooked: {'; '.join(told)}")
-
-    def _outcome(self, trial):
-        """Return what came of one try, and what was wrong with it."""
-        try:
-            outcome = self.course.run(trial)
-        except DisturbedError as error:
-            return None, str(error)
-        wrong = wrong_with(trial, outcome)
-        return outcome, f"{wrong}, {outcome.details()}" if wrong else ""
-
-    def close(self):
-        """Fail where too little was judged."""
-        share = self._whole.share()
-        least = LEAST_JUDGED * len(self.tried) if share < OVERBOOKED_SHARE else min(1, len(self.tried))
-        unjudged = [name for name in self.tried if name not in self.judged]
-        if len(self.judged) < least:
-            pytest.fail(
-                f"only {len(self.judged)} of {len(self.tried)} faults were judged, not {', '.join(unjudged)}; "
-                f"somebody waited for a processor {share:.0%} of the time"
-            )
-
-
 def wrong_with(trial, outcome):
     wrong = list(outcome.failures())
     expected = REASONS.get(trial.name.split("_")[0])
@@ -85,7 +38,7 @@ def wrong_with(trial, outcome):
 @pytest.fixture(scope="module")
 def bench():
     with Course("127.0.0.33") as opened:
-        made = Bench(opened)
+        made = JudgedCourse(opened, wrong_with)
         yield made
         made.close()
 
@@ -150,7 +103,7 @@ BUSY, QUIET = 0.6, 0.02
 )
 def test_what_is_not_as_asked_fails_unless_the_machine_was_overbooked_in_every_try(monkeypatch, shares, verdict, n):
     shared(monkeypatch, *shares)
-    bench = Bench(Stub(late))
+    bench = JudgedCourse(Stub(late), wrong_with)
     with pytest.raises(verdict, match=f"{TRIALS[0].name}.*noticed after 150 ms"):
         bench.run(TRIALS[0])
     assert bench.course.n == n
@@ -160,7 +113,7 @@ def test_what_is_not_as_asked_fails_unless_the_machine_was_overbooked_in_every_t
 @pytest.mark.parametrize(("share", "verdict"), [(QUIET, pytest.fail.Exception), (BUSY, pytest.skip.Exception)])
 def test_a_disturbance_leaves_a_fault_unjudged_on_an_overbooked_machine_only(monkeypatch, share, verdict):
     shared(monkeypatch, share)
-    bench = Bench(Stub(disturbed))
+    bench = JudgedCourse(Stub(disturbed), wrong_with)
     with pytest.raises(verdict, match=f"{TRIALS[0].name}.*of the processors"):
         bench.run(TRIALS[0])
     assert bench.course.n == 1
@@ -177,7 +130,7 @@ def test_a_run_that_judged_too_little_fails_and_names_what_it_did_not_judge(
     monkeypatch, n_judged, n_tried, share, is_enough
 ):
     shared(monkeypatch, share)
-    bench = Bench(None)
+    bench = JudgedCourse(None, wrong_with)
     bench.tried = [f"fault_{k}" for k in range(n_tried)]
     bench.judged = bench.tried[:n_judged]
     if is_enough:

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from robot.chain import ToolChain
-from robot.messages import Heading
+from robot.errors import NotEngagedError
+from robot.messages import Heading, StationMode
 from robot.operated import OperatedStation
 from robot.rigs import build_operator, build_station
 from sim_twin.controller.process import ControllerProcess
@@ -60,4 +61,8 @@ def test_a_station_that_falls_silent_leaves_its_arm_at_rest_far_short_of_the_tar
     assert np.linalg.norm(tool_m[resting] - tool_m[-1], axis=1).max() < 1e-4
     assert math.dist(tool_m[0], tool_m[-1]) < SLOW_M_S * REST_S
     assert math.dist(result.executed.target_m, tool_m[-1]) > 0.05
-    assert not station.step(AHEAD).is_void
+    late = station.step(AHEAD)
+    assert late.verdicts[0].reason == "stale_intent"
+    assert station.state.mode is StationMode.LATCHED
+    with pytest.raises(NotEngagedError):
+        station.step(AHEAD)
