@@ -220,7 +220,9 @@ def _accelerations(course: Course) -> tuple[Array, NDArray[np.bool_]]:
 
     Set-points come once a tick and the servo follows each in a few steps of physics, so that the instant's acceleration
     ripples; a command has no say in less than a tick. In contact, and while the plant runs its own stop, other limits
-    hold: forces, and distance and time of a stop.
+    hold: forces, and distance and time of a stop. A drive that gives all its torque follows no law of a servo: a stair
+    of a set-point asks for more than that from a light joint at speed, and for a step of physics the joint gathers what
+    its torque over its inertia makes of it. What was asked of it is judged by the set-points all the same.
 
     Returns:
         (n, 6), zero where it is not judged, and whether speed was gained by it.
@@ -230,7 +232,15 @@ def _accelerations(course: Course) -> tuple[Array, NDArray[np.bool_]]:
         return np.empty((0, 6)), np.empty((0, 6), dtype=bool)
     now, then = course.qd_rad_s[n:], course.qd_rad_s[:-n]
     rate = np.abs(now - then) / (n * course.physics_s)
-    return np.where(_near(course, course.stopping | _pressed(course))[n:, None], 0.0, rate), now * (now - then) > 0.0
+    odd = _near(course, course.stopping | _pressed(course))[n:, None] | _within(course.at_torque, 2 * n)[n:]
+    return np.where(odd, 0.0, rate), now * (now - then) > 0.0
+
+
+def _within(when: NDArray[np.bool_], n: int) -> NDArray[np.bool_]:
+    """Return whether something was so in the last n steps, joint by joint.  (k, 6), () -> (k, 6)"""
+    so_far = np.cumsum(np.concatenate([np.zeros((1, when.shape[1]), dtype=int), when]), axis=0)
+    before = np.maximum(np.arange(1, len(when) + 1) - n, 0)
+    return so_far[1:] - so_far[before] > 0
 
 
 def _pressed(course: Course) -> NDArray[np.bool_]:

@@ -20,6 +20,7 @@ __all__ = ["Course", "PartKind", "Recorder", "Touch", "part_kinds"]
 
 Array = NDArray[np.float64]
 N_JOINTS = 6
+ALL_OF = 1.0 - 1e-9
 POINTS = ("tcp", "flange", "elbow")
 
 
@@ -62,6 +63,8 @@ class Course(msgspec.Struct, frozen=True, kw_only=True):
     """(n, 6)"""
     set_point_rad: Array
     """(ticks, 6) what reached the joints' drives"""
+    at_torque: NDArray[np.bool_]
+    """(n, 6) whether a joint's drive gave all the torque it has"""
     opening_m: Array
     """(n,) distance between the pads"""
     grip_force_n: Array
@@ -115,6 +118,8 @@ class Recorder:
         n = most_ticks * world.n_substeps
         self._q, self._qd = np.empty((n, N_JOINTS)), np.empty((n, N_JOINTS))
         self._set_points = np.empty((most_ticks, N_JOINTS))
+        self._at_torque = np.empty((n, N_JOINTS), dtype=bool)
+        self._most_nm = model.actuator_forcerange[world.joint_controls, 1] * ALL_OF
         self._fingers = np.empty((n, 2))
         self._grip = np.empty(n)
         self._points, self._approach = np.empty((n, 3, 3)), np.empty((n, 3))
@@ -160,6 +165,7 @@ class Recorder:
         return Course(
             physics_s=float(self._world.model.opt.timestep), n_substeps=self._world.n_substeps,
             q_rad=self._q[:n], qd_rad_s=self._qd[:n], set_point_rad=self._set_points[:ticks],
+            at_torque=self._at_torque[:n],
             opening_m=self._fingers[:n].sum(axis=1),
             grip_force_n=np.abs(self._grip[:n]),
             position_m=points, speed_m_s=_speeds(points, self._twists[:n], self._centre[:n]),
@@ -184,6 +190,7 @@ class Recorder:
         self._q[k], self._qd[k] = data.qpos[:N_JOINTS], data.qvel[:N_JOINTS]
         self._fingers[k] = data.qpos[self._finger_at]
         self._grip[k] = data.actuator_force[self._world.grip_control]
+        self._at_torque[k] = np.abs(data.actuator_force[self._world.joint_controls]) >= self._most_nm
         elbow = self._forearm + self._forearm_frame @ self._elbow_offset
         self._points[k, 0], self._points[k, 1], self._points[k, 2] = self._tcp, self._flange, elbow
         self._approach[k] = self._tool_frame[:, 2]

@@ -142,6 +142,28 @@ def ramp(rate: float, n: int, begin: float = 0.0) -> list[float]:
     return [begin + rate * 0.01 * k for k in range(1, n + 1)]
 
 
+@pytest.mark.parametrize(("joint", "is_seen"), [(None, True), (4, True), (5, False)])
+def test_what_a_drive_at_its_torque_does_is_judged_by_its_set_points_alone(stage, joint, is_seen):
+    go(stage, ramp(1.5 * stage.profile.joints[5].acceleration_rad_s2, 12))
+    course = stage.recorder.course()
+    assert not course.at_torque.any()
+    at_torque = course.at_torque.copy()
+    if joint is not None:
+        at_torque[:, joint] = True
+    monitor = Monitor(stage.world, stage.profile, allowances_for(stage.profile, NOMINAL))
+    came = {r.limit: r.is_broken for r in monitor.judge(replace(course, at_torque=at_torque))}
+    assert came["joint_acceleration"] is is_seen
+    assert came["command_acceleration"]
+
+
+def test_a_drive_at_its_torque_is_known_by_its_force(stage):
+    """A stair of 0.1 rad asks wrist 3 for more than it has, one of 1 mrad does not."""
+    go(stage, [0.1, 0.1, 0.1])
+    assert not stage.recorder.course().at_torque.any()
+    go(stage, [10.0])
+    assert stage.recorder.course().at_torque.any(axis=0).tolist() == [False] * 5 + [True]
+
+
 @pytest.mark.parametrize(("share", "is_seen"), [(0.5, False), (1.5, True)])
 def test_a_speed_that_changes_too_fast_is_seen(stage, share, is_seen):
     came = go(stage, ramp(share * stage.profile.joints[5].acceleration_rad_s2, 25))
