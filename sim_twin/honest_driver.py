@@ -6,9 +6,12 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
+from config.limits import Profile
 from config.resolved import Resolved
+from robot.envelope import Envelope
 from robot.kinematics import Kinematics
 from robot.messages import ArmCommand, GripCommand, Intent, Twist, Vec3, Vec6
+from robot.safety import Gate, GateLimits
 from sim_twin.bench import open_twin
 from sim_twin.plant import TwinPlant
 
@@ -21,6 +24,7 @@ EASE_PER_S = 5.0
 """A driver slows down before a goal: no faster than so many of the distance left a second."""
 THERE_M = 0.006
 N_REACHES, MOST_STEPS = 10, 200
+ANY = 1e9
 HEIGHTS_M = (0.225, 0.2)
 STILL_M = 2e-5
 """A tool that moves by less in a time step rests."""
@@ -79,7 +83,10 @@ class _Shaped:
 
 
 class _Bare:
-    """The same twin, its joints commanded straight from a point that goes as the driver asks: nothing in between."""
+    """The same twin, its joints commanded straight from a point that goes as the driver asks.
+
+    Nothing shapes them; the gate passes them, its limits of acceleration and jerk set aside.
+    """
 
     def __init__(self, resolved: Resolved) -> None:
         self._plant = TwinPlant(arm=resolved.arm, scenario=resolved.scenario, rig=resolved.rig)
@@ -87,8 +94,17 @@ class _Bare:
         self._tick_s, self._n_ticks = resolved.rig.tick_s, round(resolved.arm.motion.step_s / resolved.rig.tick_s)
         self._grip = GripCommand(opening_m=tool.stroke_m, force_n=tool.grip_force_n, speed_m_s=tool.speed_m_s[1])
         self._arm.connect()
+        self._gate = Gate(
+            arm=self._arm,
+            limits=GateLimits.of(
+                resolved.arm, self._arm.spec, table_m=resolved.scenario.table.height_m, tick_s=self._tick_s
+            ),
+            envelope=Envelope.of(_any_rate(resolved.profile), resolved.arm, tick_s=self._tick_s),
+            chain=self._kinematics.chain,
+        )
         self._plant.resetter.reset(seed=3, epoch=0, digital_out=0)
         self._state = self._arm.read()
+        self._gate.seed(self._state)
         self._q, self._asked = self._state.q_rad, np.array(self._state.tcp_position_m)
 
     @property
@@ -96,15 +112,25 @@ class _Bare:
         return self._state.tcp_position_m
 
     def step(self, velocity_m_s: Vec3) -> None:
+        now_ns = self._arm.clock.now_ns
+        assert self._gate.admit(Twist(linear_m_s=velocity_m_s), now_ns=now_ns()) is None
         for _ in range(self._n_ticks):
             self._asked += np.array(velocity_m_s) * self._tick_s
             x, y, z = self._asked.tolist()
             self._q = self._kinematics.solve((x, y, z), self._q)
-            self._arm.write(
-                ArmCommand(stamp_ns=self._arm.clock.now_ns(), sequence=0, q_rad=self._q, grip=self._grip, digital_out=0)
+            command = ArmCommand(
+                stamp_ns=now_ns(), sequence=self._gate.next_sequence, q_rad=self._q, grip=self._grip, digital_out=0
             )
+            refused = self._gate.write(command, self._state, now_ns=now_ns())
+            assert refused is None, refused
             self._arm.clock.wait_tick()
-        self._state = self._arm.read()
+            self._state = self._arm.read()
+
+
+def _any_rate(profile: Profile) -> Profile:
+    rates = ("acceleration_rad_s2", "jerk_rad_s3", "stop_acceleration_rad_s2", "stop_jerk_rad_s3")
+    joints = tuple(msgspec.structs.replace(j, **dict.fromkeys(rates, ANY)) for j in profile.joints)
+    return msgspec.structs.replace(profile, joints=joints)
 
 
 class Drive(msgspec.Struct, frozen=True, kw_only=True):

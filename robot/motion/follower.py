@@ -5,12 +5,23 @@ from itertools import pairwise
 from operator import le
 
 from config.arm import ArmConfig
+from robot.chain import Points
 from robot.envelope import Envelope
 from robot.geometry import turn_about_vertical, unwound
 from robot.kinematics import Kinematics, UnreachableError
 from robot.messages import Vec3, Vec6
 from robot.motion.free import free_bounds, is_free_step
-from robot.motion.holding import Met, brake_share, share_of_way, slid, stretch, too_fast
+from robot.motion.holding import (
+    TIP,
+    Met,
+    brake_share,
+    share_left,
+    share_of_way,
+    slid,
+    stretch,
+    tips_too_fast,
+    too_fast,
+)
 from robot.motion.limiter import AxisLimits, Limiter
 from robot.motion.pacing import braked, part_way, window
 
@@ -52,9 +63,17 @@ class Follower:
         held: What held the last tick back and by which share of its step, if anything did.
     """
 
-    def __init__(self, arm: ArmConfig, *, envelope: Envelope, tick_s: float) -> None:
+    def __init__(self, arm: ArmConfig, *, envelope: Envelope, tick_s: float, tip_min_m: float = -math.inf) -> None:
+        """Put the parts together.
+
+        Args:
+            arm: the arm's file.
+            envelope: what of the limits profile is held.
+            tick_s: how long a tick is.
+            tip_min_m: how low fingertips may go on the way to joints, base frame; an upright tool's targets see to that.
+        """
         motion, joints = arm.motion, arm.joints
-        self._envelope = envelope
+        self._envelope, self._tip_min_m = envelope, tip_min_m
         self._fence_names = {fence.name for fence in envelope.fences}
         self._is_swift = tick_s < SWIFT_TICK_S
         self._kinematics = Kinematics(arm, is_swift=True)
@@ -77,7 +96,7 @@ class Follower:
             tick_s=tick_s,
         )
         self._joint_step_rad = tuple(SPEED_SHARE * j.speed_rad_s * tick_s for j in joints)
-        self._bounds = free_bounds(envelope, self._kinematics.chain)
+        self._bounds = free_bounds(envelope, self._kinematics.chain, tip_min_m=tip_min_m)
         self.seed(arm.home_rad)
 
     def seed(self, q_rad: Vec6) -> None:
@@ -260,7 +279,7 @@ class Follower:
                 base = braked(now, self.q_before_rad, self._q_earlier_rad, ends, within)
             there = chain.points(_moved(now, base))
             for limit in met:
-                left = share_of_way(limit, base, self._points, there, envelope)
+                left = self._left(limit, base, there)
                 if left < share:
                     share, name = left, limit.name
         if share < 1.0:
@@ -279,11 +298,22 @@ class Follower:
         if fastest <= 0.0:
             return []
         lost = brake_share(fastest, envelope)
-        end = None
-        if not self._is_upright and envelope.fences:
-            end = self._kinematics.chain.points(_between(now, _moved(now, steps), stretch(lost, envelope)))[0]
         places = (self._points_before, self._points, points)
-        return too_fast(now, steps, places, end, lost, envelope)
+        if self._is_upright:
+            return too_fast(now, steps, places, None, lost, envelope)
+        end = self._kinematics.chain.points(_between(now, _moved(now, steps), stretch(lost, envelope)))
+        heights_m = [self._lowest_m(place) for place in (self._points, points, end)]
+        met = tips_too_fast(heights_m[0], heights_m[1], heights_m[2], self._tip_min_m, lost, envelope)
+        return too_fast(now, steps, places, end[0], lost, envelope) + met
+
+    def _left(self, limit: Met, base: list[float], there: tuple[Points, float]) -> float:
+        """Return how much of the way from a braking arm's step to the one that was wanted a limit leaves."""
+        if limit.kind == TIP:
+            return share_left(limit, self._lowest_m(self._points) - self._lowest_m(there))
+        return share_of_way(limit, base, self._points, there, self._envelope)
+
+    def _lowest_m(self, place: tuple[Points, float]) -> float:
+        return self._kinematics.chain.lowest_m(place[0][0], place[1])
 
     def _go_on(self, q: Vec6, tcp_m: Vec3) -> None:
         """Let the limiter in charge go on from joints that are other than it said."""

@@ -8,7 +8,7 @@ import math
 
 import numpy as np
 
-from robot.chain import Points, ToolChain, chain_points
+from robot.chain import Points, ToolChain, chain_points, lowest_fingertip
 from robot.compiled import Table, compiled
 from robot.envelope import Envelope, braking_step
 from robot.fences import fence_gap, row_of
@@ -24,13 +24,13 @@ Place = tuple[Points, float]
 """Points and the cosine of the tilt, as chain.ToolChain.points returns them."""
 
 
-def free_bounds(envelope: Envelope, chain: ToolChain) -> Table:
-    """Return what `is_free_step` holds a step to besides joints and fences.  () -> (3, 6)"""
+def free_bounds(envelope: Envelope, chain: ToolChain, *, tip_min_m: float) -> Table:
+    """Return what `is_free_step` holds a step to besides joints and fences, fingertips to so low at least.  () -> (3, 6)"""
     return np.array(
         [
             (*chain.tcp_m, *chain.elbow_m),
             (*envelope.part_step_m, envelope.fence_far_m, envelope.fence_braking_m, envelope.onset),
-            (envelope.overshoot, envelope.cone_near_cosine, braked_step(envelope), 0.0, 0.0, 0.0),
+            (envelope.overshoot, envelope.cone_near_cosine, braked_step(envelope), chain.tip_m, chain.finger_m, tip_min_m),
         ]
     )
 
@@ -117,6 +117,7 @@ def is_free_step(
     is_free = (
         _are_parts_slow(before, now[0], to, b)
         and (down >= b[2, 1] or down >= now[1])
+        and (is_straight or lowest_fingertip(to[0], down, b[2, 3], b[2, 4]) - b[2, 5] > b[1, 3])
         and _are_fences_far(now[0], to, fences, b, fastest, is_straight)
     )
     return is_free, (to, down)

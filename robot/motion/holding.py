@@ -24,7 +24,10 @@ __all__ = [
     "braked_step",
     "led_out",
     "share_of_giving_way",
+    "TIP",
+    "share_left",
     "share_of_way",
+    "tips_too_fast",
     "slid",
     "stretch",
     "too_fast",
@@ -47,7 +50,7 @@ NEAR_SPEED = 0.8
 TILT_RAD_S2 = 5.0
 """Deceleration of the tool's tilt that is counted on ahead of its cone."""
 PART_NAMES = ("tcp_speed", "flange_speed", "elbow_speed")
-JOINT, PART, FENCE, CONE = range(4)
+JOINT, PART, FENCE, CONE, TIP = range(5)
 
 Points = tuple[Vec3, Vec3, Vec3]
 Place = tuple[Points, float]
@@ -132,8 +135,31 @@ def share_of_way(met: Met, steps: Sequence[float], now: Place, base: Place, enve
         size = fence.gap(now[0][fence.part]) - fence.gap(base[0][fence.part])
     else:
         size = _angle(base[1]) - _angle(now[1])
+    return share_left(met, size)
+
+
+def share_left(met: Met, size: float) -> float:
+    """Return how much of the way from a braking arm's step, so long towards a limit, to the wanted one is left."""
     wanted = abs(met.size)
     return min(1.0, (met.most - size) / (wanted - size)) if size < met.most else 0.0
+
+
+def tips_too_fast(now_m: float, to_m: float, end_m: float, least_m: float, lost: float, envelope: Envelope) -> list[Met]:
+    """Return the table, if fingertips would go down at it too fast.
+
+    Args:
+        now_m: their height at the last command.
+        to_m: where the step leads.
+        end_m: where joints that brake together would come to rest.
+        least_m: how high they must stay.
+        lost: share of every step that braking takes off in a tick.
+        envelope: the limits.
+    """
+    size = max(now_m - to_m, (now_m - end_m) / stretch(lost, envelope))
+    if size <= 0.0:
+        return []
+    most = braking_step(now_m - least_m - MARGIN_M, min(envelope.fence_braking_m, lost * size), envelope.onset)
+    return [Met("table", TIP, 0, size, most)] if size > most else []
 
 
 def share_of_giving_way(now_rad: Vec6, last_rad: Vec6, q_rad: Vec6, measured_rad: Vec6, envelope: Envelope) -> float:

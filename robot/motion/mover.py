@@ -63,7 +63,7 @@ class Mover:
         """
         self._approach, self._stops = approach, stops
         self._limits = TargetLimits.of(arm, table_m)
-        self._follower = Follower(arm, envelope=envelope, tick_s=tick_s)
+        self._follower = Follower(arm, envelope=envelope, tick_s=tick_s, tip_min_m=self._limits.tip_min_m)
         self._envelope = envelope
         self._contact = ContactGuard(arm)
         self._trail = Trail(arm.servo, tick_s=tick_s, q_rad=self._follower.q_rad)

@@ -13,12 +13,13 @@ from robot.geometry import between
 from robot.kinematics import Kinematics
 from robot.motion.follower import Follower
 from robot.motion.free import free_bounds, is_free_step
-from robot.motion.holding import brake_share, stretch, too_fast
+from robot.motion.holding import brake_share, stretch, tips_too_fast, too_fast
 from robot.motion.pacing import window
 from tests.support.profiles import ARM, envelope
 
 CHAIN, KINEMATICS = ToolChain(ARM), Kinematics(ARM)
 N_DRAWN = 3000
+TIP_MIN_M = 0.01
 
 
 def vec(values):
@@ -50,7 +51,9 @@ def is_held(steps, held, *, is_straight):
     lost = brake_share(max(map(abs, step)), held)
     end = None if is_straight else CHAIN.points(between(now, wanted, stretch(lost, held)))[0]
     places = (CHAIN.points(before)[0], CHAIN.points(now), CHAIN.points(wanted))
-    return bool(too_fast(now, step, places, end, lost, held))
+    heights = [CHAIN.tcp_and_lowest(q)[1] for q in (now, wanted, between(now, wanted, stretch(lost, held)))]
+    tips = [] if is_straight else tips_too_fast(*heights, TIP_MIN_M, lost, held)
+    return bool(too_fast(now, step, places, end, lost, held) or tips)
 
 
 @pytest.mark.parametrize("is_straight", [True, False])
@@ -59,7 +62,7 @@ def is_held(steps, held, *, is_straight):
 def test_nothing_holds_a_free_step_back(name, tick_s, is_straight):
     held = envelope(tick_s, name)
     held = replace(held, fences=(*held.fences, plane_gap("wall", 0, (0.0, 1.0, 0.0), -0.3)))
-    bounds, rng = free_bounds(held, CHAIN), np.random.default_rng(1)
+    bounds, rng = free_bounds(held, CHAIN, tip_min_m=TIP_MIN_M), np.random.default_rng(1)
     n_free = n_left = 0
     for _ in range(N_DRAWN):
         steps = drawn(rng, held)
@@ -79,7 +82,7 @@ def test_nothing_holds_a_free_step_back(name, tick_s, is_straight):
 def test_a_tool_on_its_way_over_the_table_is_nearly_always_free():
     """What is drawn above is wild; on an honest way the shortcut must save its time."""
     follower, n_free = Follower(ARM, envelope=envelope(0.01), tick_s=0.01), 0
-    bounds = free_bounds(envelope(0.01), CHAIN)
+    bounds = free_bounds(envelope(0.01), CHAIN, tip_min_m=TIP_MIN_M)
     held, x, y = envelope(0.01), *follower.target_m[:2]
     assert follower.aim((x, y + 0.2, 0.2), follower.yaw_rad)
     trail = [ARM.home_rad] * 3
@@ -97,7 +100,7 @@ def test_a_tool_on_its_way_over_the_table_is_nearly_always_free():
 
 def test_an_arm_that_holds_still_and_what_is_not_a_number_are_not_free():
     held, home = envelope(0.01), ARM.home_rad
-    bounds, place = free_bounds(held, CHAIN), CHAIN.points(ARM.home_rad)
+    bounds, place = free_bounds(held, CHAIN, tip_min_m=TIP_MIN_M), CHAIN.points(ARM.home_rad)
     near = vec(v + 1e-4 for v in home)
     args = (place[0], place, CHAIN.rows, bounds, held.joint_rows, held.fence_rows, True)
     assert is_free_step((near, home, home, home), *args)[0]

@@ -134,7 +134,7 @@ def test_what_is_held_is_no_obstacle_to_palm_and_fingers(served):
 def test_what_is_perceived_crosses_to_the_servo_process_with_its_time_step(served):
     tool_m = served.loop.state.tcp_position_m
     around = surroundings((0.3, 0.3, 0.1), tool_m=tool_m)
-    request = StrideRequest(intent=pack_intent(AHEAD), grip=served._grip, n_ticks=5, around=around)
+    request = StrideRequest(intent=pack_intent(AHEAD), grip=served._grip, n_ticks=5, sequence=1, around=around)
     crossed = msgspec.msgpack.decode(msgspec.msgpack.encode(request), type=StrideRequest)
     assert crossed.around == around
     served.server._answer(crossed)
