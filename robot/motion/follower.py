@@ -70,7 +70,7 @@ class Follower:
             arm: the arm's file.
             envelope: what of the limits profile is held.
             tick_s: how long a tick is.
-            tip_min_m: how low fingertips may go on the way to joints, base frame; an upright tool's targets see to that.
+            tip_min_m: how low fingertips may go on the way to joints, base frame; upright, their target sees to it.
         """
         motion, joints = arm.motion, arm.joints
         self._envelope, self._tip_min_m = envelope, tip_min_m

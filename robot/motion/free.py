@@ -30,7 +30,14 @@ def free_bounds(envelope: Envelope, chain: ToolChain, *, tip_min_m: float) -> Ta
         [
             (*chain.tcp_m, *chain.elbow_m),
             (*envelope.part_step_m, envelope.fence_far_m, envelope.fence_braking_m, envelope.onset),
-            (envelope.overshoot, envelope.cone_near_cosine, braked_step(envelope), chain.tip_m, chain.finger_m, tip_min_m),
+            (
+                envelope.overshoot,
+                envelope.cone_near_cosine,
+                braked_step(envelope),
+                chain.tip_m,
+                chain.finger_m,
+                tip_min_m,
+            ),
         ]
     )
 

@@ -18,18 +18,18 @@ from robot.safety import Braking
 
 __all__ = [
     "MARGIN_M",
+    "TIP",
     "Met",
     "Points",
     "brake_share",
     "braked_step",
     "led_out",
-    "share_of_giving_way",
-    "TIP",
     "share_left",
+    "share_of_giving_way",
     "share_of_way",
-    "tips_too_fast",
     "slid",
     "stretch",
+    "tips_too_fast",
     "too_fast",
 ]
 
@@ -144,7 +144,9 @@ def share_left(met: Met, size: float) -> float:
     return min(1.0, (met.most - size) / (wanted - size)) if size < met.most else 0.0
 
 
-def tips_too_fast(now_m: float, to_m: float, end_m: float, least_m: float, lost: float, envelope: Envelope) -> list[Met]:
+def tips_too_fast(
+    now_m: float, to_m: float, end_m: float, least_m: float, lost: float, envelope: Envelope
+) -> list[Met]:
     """Return the table, if fingertips would go down at it too fast.
 
     Args:
