@@ -302,8 +302,8 @@ class Follower:
         if self._is_upright:
             return too_fast(now, steps, places, None, lost, envelope)
         end = self._kinematics.chain.points(_between(now, _moved(now, steps), stretch(lost, envelope)))
-        heights_m = [self._lowest_m(place) for place in (self._points, points, end)]
-        met = tips_too_fast(heights_m[0], heights_m[1], heights_m[2], self._tip_min_m, lost, envelope)
+        heights_m = (self._lowest_m(self._points), self._lowest_m(points), self._lowest_m(end))
+        met = tips_too_fast(heights_m, self._tip_min_m, lost, envelope)
         return too_fast(now, steps, places, end[0], lost, envelope) + met
 
     def _left(self, limit: Met, base: list[float], there: tuple[Points, float]) -> float:

@@ -25,19 +25,13 @@ Place = tuple[Points, float]
 
 
 def free_bounds(envelope: Envelope, chain: ToolChain, *, tip_min_m: float) -> Table:
-    """Return what `is_free_step` holds a step to besides joints and fences, fingertips to so low at least.  () -> (3, 6)"""
+    """Return what `is_free_step` holds a step to besides joints and fences: fingertips to a height.  () -> (3, 6)"""
+    held = (envelope.overshoot, envelope.cone_near_cosine, braked_step(envelope))
     return np.array(
         [
             (*chain.tcp_m, *chain.elbow_m),
             (*envelope.part_step_m, envelope.fence_far_m, envelope.fence_braking_m, envelope.onset),
-            (
-                envelope.overshoot,
-                envelope.cone_near_cosine,
-                braked_step(envelope),
-                chain.tip_m,
-                chain.finger_m,
-                tip_min_m,
-            ),
+            (*held, chain.tip_m, chain.finger_m, tip_min_m),
         ]
     )
 

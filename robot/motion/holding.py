@@ -144,19 +144,16 @@ def share_left(met: Met, size: float) -> float:
     return min(1.0, (met.most - size) / (wanted - size)) if size < met.most else 0.0
 
 
-def tips_too_fast(
-    now_m: float, to_m: float, end_m: float, least_m: float, lost: float, envelope: Envelope
-) -> list[Met]:
+def tips_too_fast(heights_m: Vec3, least_m: float, lost: float, envelope: Envelope) -> list[Met]:
     """Return the table, if fingertips would go down at it too fast.
 
     Args:
-        now_m: their height at the last command.
-        to_m: where the step leads.
-        end_m: where joints that brake together would come to rest.
+        heights_m: theirs at the last command, where the step leads, and where joints that brake together come to rest.
         least_m: how high they must stay.
         lost: share of every step that braking takes off in a tick.
         envelope: the limits.
     """
+    now_m, to_m, end_m = heights_m
     size = max(now_m - to_m, (now_m - end_m) / stretch(lost, envelope))
     if size <= 0.0:
         return []

@@ -51,8 +51,8 @@ def is_held(steps, held, *, is_straight):
     lost = brake_share(max(map(abs, step)), held)
     end = None if is_straight else CHAIN.points(between(now, wanted, stretch(lost, held)))[0]
     places = (CHAIN.points(before)[0], CHAIN.points(now), CHAIN.points(wanted))
-    heights = [CHAIN.tcp_and_lowest(q)[1] for q in (now, wanted, between(now, wanted, stretch(lost, held)))]
-    tips = [] if is_straight else tips_too_fast(*heights, TIP_MIN_M, lost, held)
+    heights = tuple(CHAIN.tcp_and_lowest(q)[1] for q in (now, wanted, between(now, wanted, stretch(lost, held))))
+    tips = [] if is_straight else tips_too_fast(heights, TIP_MIN_M, lost, held)
     return bool(too_fast(now, step, places, end, lost, held) or tips)
 
 

@@ -11,6 +11,7 @@ from robot.hal.fake import FakeArm
 from robot.kinematics import Kinematics
 from robot.messages import Hold, JointTarget, Twist
 from robot.motion import Mover
+from robot.motion.follower import Follower
 from robot.safety import Gate, GateLimits
 from tests.support.profiles import ARM, envelope, profile
 from tests.support.stations import arm_state, command
@@ -130,6 +131,8 @@ def test_a_joint_target_at_the_end_of_its_range_is_reached_slowly_and_never_refu
     driven = Driven(arm=WIDE_OPEN, q=q, workspace=Workspace())
     driven.gate._limits = replace(driven.gate.limits, tip_min_m=-9.0, workspace_m=((-9.0,) * 3, (9.0,) * 3))
     driven.mover._limits = replace(driven.mover._limits, tip_min_m=-9.0, workspace_m=((-9.0,) * 3, (9.0,) * 3))
+    driven.mover._follower = Follower(driven.arm, envelope=driven.envelope, tick_s=DT)
+    driven.mover.seed(arm_state(q))
     target = tuple(end if k == joint else v for k, v in enumerate(q))
     driven.drive(JointTarget(q_rad=target), 6.0)
     path = np.array(driven.path)[:, joint]
