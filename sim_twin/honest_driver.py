@@ -85,7 +85,7 @@ class _Shaped:
 class _Bare:
     """The same twin, its joints commanded straight from a point that goes as the driver asks.
 
-    Nothing shapes them; the gate passes them, its limits of acceleration and jerk set aside.
+    Nothing shapes them; the gate passes them, its limits of speed, acceleration and jerk of the profile set aside.
     """
 
     def __init__(self, resolved: Resolved) -> None:
@@ -130,7 +130,8 @@ class _Bare:
 def _any_rate(profile: Profile) -> Profile:
     rates = ("acceleration_rad_s2", "jerk_rad_s3", "stop_acceleration_rad_s2", "stop_jerk_rad_s3")
     joints = tuple(msgspec.structs.replace(j, **dict.fromkeys(rates, ANY)) for j in profile.joints)
-    return msgspec.structs.replace(profile, joints=joints)
+    speeds = msgspec.structs.replace(profile.speeds, tcp_m_s=ANY, flange_m_s=ANY, elbow_m_s=ANY)
+    return msgspec.structs.replace(profile, joints=joints, speeds=speeds)
 
 
 class Drive(msgspec.Struct, frozen=True, kw_only=True):

@@ -43,16 +43,27 @@ def _greatest_step(steps: Steps, joints: Table) -> float:
     fastest = 0.0
     for i in range(6):
         step, was, rate = wanted[i] - now[i], now[i] - before[i], before[i] - earlier[i]
-        size, margin = abs(step), joints[i, 2]
+        size = abs(step)
         if not (
             abs(step - was) <= RESERVE * min(joints[i, 4], joints[i, 6])
             and abs(step - 2.0 * was + rate) <= RESERVE * min(joints[i, 5], joints[i, 7])
             and size <= JOINT_RESERVE * joints[i, 3]
-            and joints[i, 0] + margin + size <= now[i] <= joints[i, 1] - margin - size
         ):
             return math.nan
         fastest = max(fastest, size)
     return fastest
+
+
+@compiled
+def _are_ends_far(steps: Steps, joints: Table, bounds: Table, fastest: float) -> bool:
+    """Return whether every joint could brake, with all the others, before its soft margin at either end."""
+    wanted, now, _, _ = steps
+    stretch = 1.0 + bounds[1, 5] + fastest / bounds[2, 2]
+    for i in range(6):
+        far = joints[i, 2] + abs(wanted[i] - now[i]) * stretch
+        if not joints[i, 0] + far <= now[i] <= joints[i, 1] - far:
+            return False
+    return True
 
 
 @compiled
@@ -116,7 +127,8 @@ def is_free_step(
     if not fastest > 0.0:
         return False, (to, down)
     is_free = (
-        _are_parts_slow(before, now[0], to, b)
+        _are_ends_far(steps, joints, b, fastest)
+        and _are_parts_slow(before, now[0], to, b)
         and (down >= b[2, 1] or down >= now[1])
         and (is_straight or lowest_fingertip(to[0], down, b[2, 3], b[2, 4]) - b[2, 5] > b[1, 3])
         and _are_fences_far(now[0], to, fences, b, fastest, is_straight)

@@ -185,12 +185,11 @@ def _of_joints(now_rad: Vec6, steps: Sequence[float], lost: float, envelope: Env
         if size > most:
             met.append(Met("joint_speed", JOINT, i, step, most))
         gap = end.high_rad - now if step > 0.0 else now - end.low_rad
+        most = braking_step(gap, min(RESERVE * RESERVE * end.gain_rad, lost * size), envelope.onset)
         if gap - size < end.margin_rad:
-            soft = RESERVE * soft_step(gap, end.margin_rad, end.step_rad)
-            braking = min(RESERVE * RESERVE * end.gain_rad, lost * size)
-            most = min(soft, braking_step(gap, braking, envelope.onset))
-            if size > most:
-                met.append(Met("soft_margin", JOINT, i, step, most))
+            most = min(most, RESERVE * soft_step(gap, end.margin_rad, end.step_rad))
+        if size > most:
+            met.append(Met("soft_margin", JOINT, i, step, most))
     return met
 
 
