@@ -10,8 +10,11 @@ __all__ = ["LidWatch"]
 
 SETTLING_S = 0.3
 """So much longer than its travel at its speed a lid may take."""
-HAND_M, BELOW_M = 0.055, 0.03
-"""How far hand, or what it holds, reaches aside of the tool centre point and below it."""
+HAND_M = 0.055
+"""How far the hand reaches aside of the tool centre point."""
+TIPS_M, HELD_M = 0.017, 0.03
+"""How far fingertips, and what a full hand holds, reach below it. Motion keeps an empty hand out of all that leaves may
+sweep and no higher over it than need be: were that hand taken to be in their way, it would wait for them for good."""
 
 
 class LidWatch:
@@ -58,10 +61,10 @@ class LidWatch:
         if self.state is LidState.UNKNOWN:
             self._since_ns = now_ns
 
-    def is_hand_in_way(self, from_middle_m: Vec3) -> bool:
+    def is_hand_in_way(self, from_middle_m: Vec3, *, is_full: bool) -> bool:
         """Return whether the hand may touch the leaves, its tool centre point seen from the table under the box."""
         x, y, z = from_middle_m
-        return z < self._high_m + BELOW_M and self._is_over(x, y, HAND_M)
+        return z < self._high_m + (HELD_M if is_full else TIPS_M) and self._is_over(x, y, HAND_M)
 
     def is_thing_in_way(self, from_middle_m: Vec3, radius_m: float) -> bool:
         """Return whether a loose thing may: one whose middle is below the rim lies in the box."""

@@ -48,6 +48,7 @@ class Obstacles:
 
     def perceive(self, seen: Surroundings) -> bool:
         """Take note of what is perceived now. Returns whether a block was changed."""
+        self._is_full = seen.is_hand_full
         is_hidden = self._held is not None and seen.places[self._held] is None
         if not (seen.is_hand_full and seen.held is None and is_hidden):  # what a hand holds it may hide
             self._held = seen.held
@@ -85,6 +86,7 @@ class Obstacles:
     def _forget(self) -> None:
         n = len(self._things)
         self._held: int | None = None
+        self._is_full = False
         self._seen: list[Place | None] = [None] * n
         self._placed: list[Place | None] = [None] * n
         self.unseen = tuple(thing.name for thing in self._things)
@@ -132,7 +134,7 @@ class Obstacles:
         def from_middle(at_m: Vec3) -> Vec3:
             return rotated((at_m[0] - x, at_m[1] - y, at_m[2] - self._table_m), back)
 
-        if lid.is_hand_in_way(from_middle(tcp_m)):
+        if lid.is_hand_in_way(from_middle(tcp_m), is_full=self._is_full):
             return True
         for k in self._loose:
             loose, where = self._things[k], self._placed[k]
