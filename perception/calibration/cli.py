@@ -95,7 +95,7 @@ def extrinsics(
     table_mm: Annotated[float, typer.Option("--table-mm", help="Height of the table in the base frame.")] = 0.0,
     json: JsonOption = False,
 ) -> None:
-    """Find where a camera stands, by touches.yaml (boards lying still) or poses.yaml (one in the hand) in the folder."""
+    """Find where a camera stands, by touches.yaml (boards lying still) or poses.yaml (one in the hand)."""
     from perception.calibration.extrinsics import fit_carried, fit_table
 
     known = load_camera(camera)
