@@ -3,6 +3,7 @@
 from collections.abc import Callable, Mapping
 from typing import Protocol, runtime_checkable
 
+from robot.frames import CameraSpec, Frame
 from robot.messages import ArmCommand, ArmSpec, ArmState, PlantIdentity, SceneState
 
 __all__ = ["Arm", "Camera", "Clock", "Frame", "Linked", "Plant", "Resetter", "SceneTruth"]
@@ -20,17 +21,24 @@ class Clock(Protocol):
         ...
 
 
-class Frame(Protocol):
-    """One camera image; its type is fixed by the camera room."""
-
-    stamp_ns: int
-
-
 class Camera(Protocol):
     """A source of frames."""
 
+    @property
+    def spec(self) -> CameraSpec:
+        """What it is, readable before connecting."""
+        ...
+
+    def connect(self) -> None:
+        """Acquire the camera. Raises WireError where there is none."""
+        ...
+
     def read(self, now_ns: int) -> Frame | None:
-        """Return the newest frame delivered by now_ns, or None."""
+        """Return the newest frame that has arrived by now_ns and was not returned before, or None."""
+        ...
+
+    def close(self) -> None:
+        """Release the camera. Idempotent, never raises."""
         ...
 
 

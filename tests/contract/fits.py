@@ -1,10 +1,11 @@
 """What implements which door: the type checker proves each line."""
 
+from perception.cameras import FolderCamera
 from perception.ground_truth import GroundTruthPerception
 from perception.percept import Perception
 from robot.clock import LockStepClock
 from robot.hal.fake import FakeArm, FakePlant
-from robot.hal.protocols import Arm, Clock, Plant
+from robot.hal.protocols import Arm, Camera, Clock, Plant
 from robot.hal.rtde import RtdeArm
 from robot.hal.rtde_clock import RtdeClock
 from robot.hal.rtde_plant import RtdePlant
@@ -22,10 +23,12 @@ from robot.teleop.script import ScriptedDevice
 from robot.teleop.spacemouse import SpaceMouse
 from sim_twin.operator import SimulatedOperator
 from sim_twin.plant import TwinArm, TwinPlant
+from sim_twin.rendered_camera import RenderedCamera
 
 __all__ = [
     "ARMABLES",
     "ARMS",
+    "CAMERAS",
     "CLOCKS",
     "DEVICES",
     "DRIVEN",
@@ -40,6 +43,7 @@ __all__ = [
 
 PLANTS: tuple[type[Plant], ...] = (FakePlant, TwinPlant, RtdePlant)
 ARMS: tuple[type[Arm], ...] = (FakeArm, TwinArm, RtdeArm)
+CAMERAS: tuple[type[Camera], ...] = (FolderCamera, RenderedCamera)
 CLOCKS: tuple[type[Clock], ...] = (LockStepClock, RtdeClock)
 STATIONS: tuple[type[Station], ...] = (LocalStation,)
 ARMABLES: tuple[type[Armable], ...] = (LocalStation,)

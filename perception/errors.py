@@ -1,0 +1,17 @@
+"""Errors of the perception room, in families by who must act."""
+
+from robot.errors import RobotConfigError, RobotError
+
+__all__ = ["CalibrationRefusedError", "OpenCvMissingError", "PerceptionConfigError"]
+
+
+class PerceptionConfigError(RobotConfigError):
+    """A file, a folder or an argument is wrong: fix it and start again."""
+
+
+class OpenCvMissingError(PerceptionConfigError):
+    """OpenCV is not installed."""
+
+
+class CalibrationRefusedError(RobotError):
+    """What was gathered is not good enough to calibrate by: gather again, as the message says."""
