@@ -198,13 +198,12 @@ class Faults:
         return {"rows": off.tolist()}
 
     def jog(self, rad: Angles) -> Answer:
-        """Let somebody at the pendant move the joints by as much, with a program of his own."""
-        refusal = self._robot.programs.refusal
-        if refusal is not None:
-            return {"refusal": f"jog: {refusal}"}
-        q = (self._robot.machine.drive.measured.q_rad + np.array(rad)).tolist()
-        self._robot.submit_script(f"def jog():\n movej({q}, a=1.0, v=0.5)\nend\n")
-        return {}
+        """Let somebody at the pendant move the joints by as much, with a program of his own.
+
+        It works in the recovery mode too, where no program does, and is the way back from beyond a plane or a limit.
+        """
+        refusal = self._robot.jog(np.array(rad))
+        return {} if refusal is None else {"refusal": f"jog: {refusal}"}
 
     def force_inputs(self, bits: Bits = 0) -> None:
         """Let these digital inputs be on, whatever the table says."""

@@ -55,11 +55,13 @@ _RAISES: dict[Event, tuple[Condition, Reaction]] = {
     Event.SAFEGUARD_OPENED: (Condition.SAFEGUARD, _GUARD),
     Event.PROTECTIVE_STOP: (Condition.PROTECTIVE, _PROTECT),
     Event.REDUCED: (Condition.REDUCED, _NONE),
+    Event.RECOVERY: (Condition.RECOVERY, _NONE),
 }
 _RELEASES = {
     Event.SYSTEM_ESTOP_RELEASED: Condition.SYSTEM_ESTOP,
     Event.ROBOT_ESTOP_RELEASED: Condition.ROBOT_ESTOP,
     Event.REDUCED_ENDED: Condition.REDUCED,
+    Event.RECOVERED: Condition.RECOVERY,
 }
 
 
@@ -168,6 +170,11 @@ class Modes:
     def is_reduced(self) -> bool:
         """Reduced limits hold."""
         return Condition.REDUCED in self._conditions
+
+    @property
+    def is_recovering(self) -> bool:
+        """The arm is beyond its limits: it is moved by hand only."""
+        return Condition.RECOVERY in self._conditions
 
     @property
     def may_move(self) -> bool:
@@ -310,6 +317,7 @@ class Modes:
 
     def _power_off(self) -> None:
         self.robot = RobotMode.POWER_OFF
+        self._conditions.discard(Condition.RECOVERY)
         self._due, self._cut_at, self._wants_running, self._was_playing = None, None, False, False
 
     def _lose_power(self) -> Reaction:

@@ -16,7 +16,7 @@ from sim_twin.controller.compiling import Compiler, InlineCompiler, MakeBuiltins
 from sim_twin.controller.hand import Hand
 from sim_twin.controller.machine import Machine
 from sim_twin.controller.motion import SLICE_S, Breach, Measured
-from sim_twin.controller.motion.limits import Cause
+from sim_twin.controller.motion.poses import Array
 from sim_twin.controller.outputs import make_outputs
 from sim_twin.controller.panel import Panel
 from sim_twin.controller.program import Programs
@@ -27,6 +27,8 @@ from sim_twin.plant import TwinWorld
 
 __all__ = ["VirtualRobot", "make_world"]
 
+JOG_RAD_S, RECOVERY_RAD_S = 0.5, 0.25
+"""The latter keeps the tool below the 250 mm/s of UR's recovery mode."""
 _PROTECTIVE_BIT, _VIOLATION_BIT = 1 << 2, 1 << 8
 _STARVED = {WatchdogAction.PAUSE: Event.PAUSE, WatchdogAction.STOP: Event.STOP}
 
@@ -114,8 +116,7 @@ class VirtualRobot:
         if breach is not None:
             self._stop_for(breach)
         self.programs.obey(machine.modes.tick(is_standing=drive.is_standing))
-        if drive.is_braked and machine.modes.may_move and machine.modes.robot is RobotMode.RUNNING:
-            drive.engage()  # the brakes came in because it pressed on while it was stopped, and it is released
+        self._look_outside()
         machine.n_standing = machine.n_standing + 1 if drive.is_standing else 0
         machine.io.digital_in = self.box.sense(machine.world.table.read_inputs()) | self.forced_inputs
         machine.io.analog_in_v = self.box.measure(machine.world.table.travel)
@@ -158,11 +159,25 @@ class VirtualRobot:
             machine.journal.note(f"watchdog: {name} was not written in time, the program is to {action.value}")
             self.programs.handle(_STARVED[action])
 
+    def _look_outside(self) -> None:
+        """Begin the recovery mode where the arm has power beyond its limits, and end it once it is back."""
+        modes = self.machine.modes
+        if modes.robot is RobotMode.RUNNING and self.machine.drive.is_outside is not modes.is_recovering:
+            self.programs.handle(Event.RECOVERED if modes.is_recovering else Event.RECOVERY)
+
+    def jog(self, by_rad: Array) -> str | None:
+        """Move the joints by as much as somebody at the pendant does, or tell why that cannot be.  (6,)"""
+        refusal = self.programs.refusal
+        if refusal is not None:
+            return refusal
+        speed = RECOVERY_RAD_S if self.machine.modes.is_recovering else JOG_RAD_S
+        q = (self.machine.drive.measured.q_rad + by_rad).tolist()
+        self.programs.submit(f"def jog():\n movej({q}, a=1.0, v={speed})\nend\n", is_by_hand=True)
+        return None
+
     def _stop_for(self, breach: Breach) -> None:
         cause = breach.cause
-        bits = self.machine.modes.safety_status_bits
-        is_pressing_still = cause is Cause.FORCE_VIOLATION and bits & _PROTECTIVE_BIT
-        if is_pressing_still or bits & (_VIOLATION_BIT if cause.is_violation else _PROTECTIVE_BIT):
+        if self.machine.modes.safety_status_bits & (_VIOLATION_BIT if cause.is_violation else _PROTECTIVE_BIT):
             # What presses goes on pressing while the arm comes to rest: one blow is one stop.
             return
         argument = cause.value[1] if breach.joint is None else breach.joint

@@ -54,7 +54,7 @@ def test_a_plane_of_the_set_up_stops_the_tool_that_is_driven_through_it():
     assert robot.machine.drive.is_standing
     assert 0.06 < robot.machine.drive.measured.tcp_pose[2] < 0.101
     assert [line for line in lines(robot) if line.startswith("C")] == [
-        "C152A0: target position is beyond a safety plane"
+        "C152A0: target moves too fast towards a safety plane to stop before it"
     ]
     server.close()
 
