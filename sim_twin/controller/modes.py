@@ -124,9 +124,10 @@ class Modes:
 
     Args:
         times: How long things take.
-        needs_safeguard_reset: A safeguard that closes waits for its reset; otherwise the program resumes by itself.
+        needs_safeguard_reset: See there.
 
     Attributes:
+        needs_safeguard_reset: A safeguard that closes waits for its reset; otherwise the program resumes by itself.
         robot: Robot mode.
         runtime: State of the program.
         is_remote: Remote control is on; who serves remote commands asks.
@@ -139,7 +140,7 @@ class Modes:
 
     def __init__(self, *, times: PowerTimes | None = None, needs_safeguard_reset: bool = False) -> None:
         self.times = times or PowerTimes()
-        self._needs_reset = needs_safeguard_reset
+        self.needs_safeguard_reset = needs_safeguard_reset
         self.robot = RobotMode.POWER_OFF
         self.runtime = RuntimeState.STOPPED
         self.is_remote = True
@@ -334,7 +335,7 @@ class Modes:
 
     def _close_guard(self) -> Reaction:
         self._is_guard_open = False
-        return _NONE if self._needs_reset else self._clear_guard()
+        return _NONE if self.needs_safeguard_reset else self._clear_guard()
 
     def _reset_guard(self) -> Reaction:
         if self._is_guard_open:

@@ -12,7 +12,7 @@ from robot.kinematics import Kinematics
 from robot.layout import draw_layout
 from sim_twin.controller.box import Box
 from sim_twin.controller.builtins import program_builtins
-from sim_twin.controller.compiling import Compiler, InlineCompiler, MakeBuiltins
+from sim_twin.controller.compiling import Compiler, InlineCompiler, MakeBuiltins, Mistake, compile_text
 from sim_twin.controller.hand import Hand
 from sim_twin.controller.machine import Machine
 from sim_twin.controller.motion import SLICE_S, Breach, Measured
@@ -20,6 +20,9 @@ from sim_twin.controller.motion.poses import Array
 from sim_twin.controller.outputs import make_outputs
 from sim_twin.controller.panel import Panel
 from sim_twin.controller.program import Programs
+from sim_twin.controller.safety_terminals import SafetyTerminals
+from sim_twin.controller.script import Builtins
+from sim_twin.controller.script.builtins import Sockets
 from sim_twin.controller.states import Event, RobotMode, RuntimeState
 from sim_twin.controller.watchdogs import WatchdogAction
 from sim_twin.controller.wire import ControllerVersion, ScriptSource
@@ -55,6 +58,7 @@ class VirtualRobot:
         is_powered: Begin with power on and brakes open.
         cell: How the table is wired to the control box; straight through where None.
         compiler: Makes programs of texts from builtins; inline, and so deterministic, where absent.
+        safety: Safety inputs of the installation; none where absent.
 
     Attributes:
         machine: Drive, modes, registers, terminals.
@@ -64,6 +68,7 @@ class VirtualRobot:
         panel: wire.DashboardTarget and wire.StateSource.
         disturb: Fault: what becomes of a measurement before anybody sees it.
         box: The wires between table and terminals.
+        safety: As given.
         forced_inputs: Fault: input bits that are on whatever the table says.
     """
 
@@ -75,10 +80,13 @@ class VirtualRobot:
         is_powered: bool = True,
         cell: CellConfig | None = None,
         compiler: Callable[[MakeBuiltins], Compiler] = InlineCompiler,
+        safety: SafetyTerminals | None = None,
     ) -> None:
         self.machine = Machine(world, version=version or ControllerVersion())
-        self.programs = Programs(self.machine, compiler(lambda sockets: program_builtins(self.machine, sockets)))
+        self.programs = Programs(self.machine, compiler(self._make_builtins))
+        self.safety = safety or SafetyTerminals()
         modes = self.machine.modes
+        modes.needs_safeguard_reset = self.safety.needs_safeguard_reset
         self.hand = Hand(world, is_powered=lambda: modes.robot not in (RobotMode.POWER_OFF, RobotMode.NO_CONTROLLER))
         self.outputs = make_outputs(self.machine, self.programs)
         self.panel = Panel(self.machine, self.programs)
@@ -118,7 +126,8 @@ class VirtualRobot:
         self.programs.obey(machine.modes.tick(is_standing=drive.is_standing))
         self._look_outside()
         machine.n_standing = machine.n_standing + 1 if drive.is_standing else 0
-        machine.io.digital_in = self.box.sense(machine.world.table.read_inputs()) | self.forced_inputs
+        table = self.box.sense(machine.world.table.read_inputs()) | self.forced_inputs
+        machine.io.digital_in = self.safety.sense(table)
         machine.io.analog_in_v = self.box.measure(machine.world.table.travel)
         self.hand.tick()
         machine.journal.end_slice()
@@ -144,6 +153,17 @@ class VirtualRobot:
         if not drive.is_braked:
             drive.engage()
         self.hand.open()
+
+    def mistake_in(self, text: str) -> Mistake | None:
+        """Return why a text is no program for this controller; None where it is one."""
+        made = compile_text(text, self._make_builtins)
+        if isinstance(made, Mistake):
+            return made
+        made.close()
+        return None
+
+    def _make_builtins(self, sockets: Sockets) -> Builtins:
+        return program_builtins(self.machine, sockets)
 
     def close(self) -> None:
         """End programs and their connections."""

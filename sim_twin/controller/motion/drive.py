@@ -20,12 +20,18 @@ from sim_twin.controller.motion.limits import (
     default_limits,
     is_outside,
 )
-from sim_twin.controller.motion.measured import Measured
+from sim_twin.controller.motion.measured import Measured, flange_velocity
 from sim_twin.controller.motion.motions import Motions
 from sim_twin.controller.motion.poses import Array, pose_from_matrix, vec6
 from sim_twin.controller.motion.setpoint import SLICE_S
 from sim_twin.controller.motion.stopping import stop_path
-from sim_twin.controller.motion.wrench import GRAVITY_M_S2, NM_PER_A, ContactWrench, is_same_payload, payload_bias
+from sim_twin.controller.motion.wrench import (
+    GRAVITY_M_S2,
+    NM_PER_A,
+    ContactWrench,
+    is_same_payload,
+    payload_bias,
+)
 from sim_twin.controller.states import MotionOrder
 from sim_twin.plant import TwinWorld
 
@@ -105,6 +111,7 @@ class TwinDrive:
         self._is_compliant = False
         self._feeling = Feeling()
         self._n_struck = 0
+        self._velocity = np.zeros(3)
         self.lock()
         self.measured = self._read()
 
@@ -299,8 +306,18 @@ class TwinDrive:
 
     @property
     def is_standing(self) -> bool:
-        """Set-point and joints are at rest."""
-        return self.motions.setpoint.fastest_rad_s < 1e-6 and float(np.abs(self.measured.qd_rad_s).max()) < 0.01
+        """Set-point and joints are at rest, whatever is read of them."""
+        return self.motions.setpoint.fastest_rad_s < 1e-6 and float(np.abs(self.world.data.qvel[:6]).max()) < 0.01
+
+    @property
+    def is_led_by_torque(self) -> bool:
+        """A program's torques move the joints."""
+        return self._is_compliant
+
+    @property
+    def deviation_ratio(self) -> float:
+        """How far the joints are off where the servos should have brought them; at 1 that is a stop (C153)."""
+        return float(np.abs(self._expected - self.measured.q_rad).max()) / self.limits.deviation_rad
 
     @property
     def is_outside(self) -> bool:
@@ -361,6 +378,8 @@ class TwinDrive:
         wrench = self._contacts.at(model, data, tool_m) - self._zero
         if not is_same_payload(self._payload, self._real_payload):
             wrench += payload_bias(self.kinematics.forward(q), tool_m, self._real_payload, self._payload)
+        velocity = flange_velocity(T_bt, J @ qd, self.core.T_ft)
+        acceleration, self._velocity = (velocity - self._velocity) / SLICE_S, velocity
         # Brakes hold without power, and the twin carries the weight whatever does.
         torque = np.zeros(6) if self.is_braked else data.qfrc_actuator[:6] + data.qfrc_gravcomp[:6]
         return Measured(
@@ -368,6 +387,7 @@ class TwinDrive:
             qd_rad_s=qd,
             tcp_pose=pose_from_matrix(T_bt),
             tcp_speed=J @ qd,
+            acceleration=acceleration,
             wrench=wrench,
             torque_nm=torque,
             current_a=torque / NM_PER_A,
