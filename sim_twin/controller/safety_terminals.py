@@ -1,6 +1,6 @@
 """The control box's safety inputs: pairs of configurable terminals that stop the robot where they are open."""
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 
 from sim_twin.controller.states import Event
 
@@ -47,9 +47,9 @@ class SafetyTerminals:
         ValueError: two functions share a terminal, or one is none.
     """
 
-    def __init__(self, pins: Mapping[str, str] | Iterable[tuple[str, str]] = ()) -> None:
-        wired = list(pins.items() if isinstance(pins, Mapping) else pins)
-        self._bits = {name: 3 << _PAIRS[pin] for name, pin in (parse_safety_input("=".join(wire)) for wire in wired)}
+    def __init__(self, pins: Mapping[str, str] | None = None) -> None:
+        wired = [parse_safety_input(f"{name}={pin}") for name, pin in (pins or {}).items()]
+        self._bits = {name: 3 << _PAIRS[pin] for name, pin in wired}
         self.mask = sum(set(self._bits.values()))
         if self.mask.bit_count() != 2 * len(wired):
             raise ValueError(f"safety inputs: expected functions and terminals once each, got {wired}")
