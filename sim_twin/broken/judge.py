@@ -6,8 +6,8 @@ import msgspec
 import numpy as np
 
 from sim_twin.controller.motion import SLICE_S
-from sim_twin.controller.motion.core import STOP_RAD_S2
 from sim_twin.controller.motion.poses import Array
+from sim_twin.controller.motion.stopping import STOP_RAD_S2
 from sim_twin.controller.trace import read_trace
 
 __all__ = ["Judged", "Motion", "stopping_s"]

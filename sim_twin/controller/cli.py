@@ -34,6 +34,13 @@ def controller(
             "--plane", help="Safety plane nx,ny,nz,offset (base frame, metres): the tool stays on the normal's side."
         ),
     ] = None,
+    safety_input: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--safety-input",
+            help="Safety function at a pair of terminals, e.g. system_estop=CI0; `fault HOST terminal` opens it.",
+        ),
+    ] = None,
     script: Annotated[Path | None, typer.Option("--script", help="URScript file to run at the start.")] = None,
     program: Annotated[
         list[Path] | None,
@@ -46,6 +53,7 @@ def controller(
     from config.errors import ConfigError
     from robot.realtime import take_priority
     from sim_twin.controller.planes import parse_plane
+    from sim_twin.controller.safety_terminals import parse_safety_input
     from sim_twin.controller.server import PRIORITY, ControllerServer, Setup
 
     try:
@@ -62,6 +70,7 @@ def controller(
             bus=bus,
             cell=cell,
             planes=tuple(map(parse_plane, plane or [])),
+            safety_inputs=dict(map(parse_safety_input, safety_input or [])),
         )
         server = ControllerServer(setup)
         with server:

@@ -63,15 +63,17 @@ class Start:
     Args:
         n_stops: How many stops had come when it was sent.
         is_remote: It was sent under remote control.
+        is_by_hand: Somebody at the arm moves it so.
 
     Attributes:
         n_stops: As given; a later stop takes it back.
         is_remote: As given; local control takes it back.
+        is_by_hand: As given; it begins in the recovery mode too.
         has_begun: Its program has begun, or never will; None while that is not known.
     """
 
-    def __init__(self, *, n_stops: int = 0, is_remote: bool = False) -> None:
-        self.n_stops, self.is_remote = n_stops, is_remote
+    def __init__(self, *, n_stops: int = 0, is_remote: bool = False, is_by_hand: bool = False) -> None:
+        self.n_stops, self.is_remote, self.is_by_hand = n_stops, is_remote, is_by_hand
         self.has_begun: bool | None = None
 
 

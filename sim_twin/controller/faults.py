@@ -9,7 +9,8 @@ import msgspec
 import numpy as np
 
 from sim_twin.controller.io import N_DIGITAL
-from sim_twin.controller.motion import DhRow, Measured, calibrated
+from sim_twin.controller.motion import SLICE_S, DhRow, Measured, calibrated
+from sim_twin.controller.motion.poses import pose_from_matrix
 from sim_twin.controller.robot import VirtualRobot
 from sim_twin.controller.states import Event, Reaction
 from sim_twin.controller.ticks import TickTimes
@@ -18,6 +19,8 @@ from sim_twin.controller.wire import Wires, input_fields
 __all__ = ["FaultError", "Faults"]
 
 SLICES_PER_MS = 0.5
+SPEED_FILTER_S = 0.25
+"""Time constant of the noise of speeds, a guess: UR's own filter is not published. 1 mrad makes 4 mrad/s of it."""
 LOOK_S = 0.1
 """A slice that takes longer is broken by looks at the faults' door."""
 Answer = dict[str, object]
@@ -58,6 +61,7 @@ class Faults:
         self.is_frozen = False
         self._late_s, self._n_late_every, self._n_ticks = 0.0, 0, 0
         self._bias_rad, self._noise_rad = np.zeros(6), 0.0
+        self._noise_before = self._noise_rad_s = np.zeros(6)
         self._by_name: dict[str, Callable[..., Answer | None]] = {
             "bias": self.bias,
             "calibrate": self.calibrate,
@@ -84,7 +88,11 @@ class Faults:
             "reserve": self.reserve,
             "safeguard_close": lambda: self._happen(Event.SAFEGUARD_CLOSED),
             "safeguard_open": lambda: self._happen(Event.SAFEGUARD_OPENED),
+            "safeguard_reset": lambda: self._happen(Event.SAFEGUARD_RESET),
             "slider": self.slider,
+            "system_estop": lambda: self._happen(Event.SYSTEM_ESTOP),
+            "system_estop_release": lambda: self._happen(Event.SYSTEM_ESTOP_RELEASED),
+            "terminal": self.safety_terminal,
             "ticks": self.tick_times,
             "truth": self.truth,
             "violation": lambda: self._happen(Event.VIOLATION),
@@ -177,8 +185,12 @@ class Faults:
         self._set_disturbance()
 
     def noise(self, rad: Deviation = 0.0) -> None:
-        """Let the joints be read with normal noise of a standard deviation; 0 ends it."""
+        """Let the joints be read with normal noise of a standard deviation, their speeds with what follows from it.
+
+        0 ends it.
+        """
         self._noise_rad = rad
+        self._noise_before = self._noise_rad_s = np.zeros(6)
         self._set_disturbance()
 
     def payload(self, kg: float = 0.0) -> None:
@@ -198,13 +210,12 @@ class Faults:
         return {"rows": off.tolist()}
 
     def jog(self, rad: Angles) -> Answer:
-        """Let somebody at the pendant move the joints by as much, with a program of his own."""
-        refusal = self._robot.programs.refusal
-        if refusal is not None:
-            return {"refusal": f"jog: {refusal}"}
-        q = (self._robot.machine.drive.measured.q_rad + np.array(rad)).tolist()
-        self._robot.submit_script(f"def jog():\n movej({q}, a=1.0, v=0.5)\nend\n")
-        return {}
+        """Let somebody at the pendant move the joints by as much, with a program of his own.
+
+        It works in the recovery mode too, where no program does, and is the way back from beyond a plane or a limit.
+        """
+        refusal = self._robot.jog(np.array(rad))
+        return {} if refusal is None else {"refusal": f"jog: {refusal}"}
 
     def force_inputs(self, bits: Bits = 0) -> None:
         """Let these digital inputs be on, whatever the table says."""
@@ -217,6 +228,12 @@ class Faults:
     def push(self, nm: Torques | None = None) -> None:
         """Push on the joints from outside, as a person would; nothing ends it."""
         self._robot.machine.world.data.qfrc_applied[:6] = nm or (0.0,) * 6
+
+    def safety_terminal(self, name: str, on: bool = False) -> Answer:
+        """Open a safety input of the installation, or close it (on); see SafetyTerminals."""
+        programs, safety = self._robot.programs, self._robot.safety
+        refusal = safety.set(name, is_closed=on, handle=lambda event: programs.handle(event).refusal)
+        return {} if refusal is None else {"refusal": refusal}
 
     def reduced(self, on: bool = True) -> Answer:
         """Let the reduced mode begin or end."""
@@ -271,8 +288,17 @@ class Faults:
 
     def _disturbed(self, measured: Measured) -> Measured:
         drive = self._robot.machine.drive
-        q = measured.q_rad + self._bias_rad + self._rng.normal(0.0, 1.0, 6) * self._noise_rad
-        return msgspec.structs.replace(measured, q_rad=q, tcp_pose=drive.kinematics.pose(q, drive.core.tcp_offset))
+        noise = self._rng.normal(0.0, 1.0, 6) * self._noise_rad
+        q = measured.q_rad + self._bias_rad + noise
+        # Speeds are found from angles: their noise is that of differences, smoothed.
+        share = SLICE_S / (SLICE_S + SPEED_FILTER_S)
+        self._noise_rad_s = self._noise_rad_s + share * ((noise - self._noise_before) / SLICE_S - self._noise_rad_s)
+        self._noise_before = noise
+        qd = measured.qd_rad_s + self._noise_rad_s
+        T_bt, J = drive.kinematics.forward_and_jacobian(q, drive.core.T_ft)
+        return msgspec.structs.replace(
+            measured, q_rad=q, qd_rad_s=qd, tcp_pose=pose_from_matrix(T_bt), tcp_speed=J @ qd
+        )
 
 
 def _told(reaction: Reaction) -> Answer:

@@ -38,6 +38,7 @@ class Journal:
     Attributes:
         lines: The log's last lines, each (stamp in µs, text).
         outbox: Robot messages as bytes; whoever owns the ports takes them.
+        remarks: Errors in words, for RTDE's clients; whoever owns the ports takes them.
         safety_mode: As it was last told.
         popup: What a person is asked to read, None where nothing is.
     """
@@ -46,6 +47,7 @@ class Journal:
         self._stamp_us = stamp_us
         self.lines: deque[tuple[int, str]] = deque(maxlen=N_LINES)
         self.outbox: deque[bytes] = deque(maxlen=N_LINES)
+        self.remarks: deque[str] = deque(maxlen=N_LINES)
         self.popup: Popup | None = None
         self.safety_mode = SafetyMode.NORMAL
         self._why: tuple[int, int] | None = None
@@ -99,11 +101,13 @@ class Journal:
         """Say where a program failed, and why: to the log, and as a robot reports it on the primary port."""
         self.note(f"program {program}, thread {thread}, line {line}: {message}")
         text = (as_reported or message)[:N_SHOWN]
+        self.remarks.append(text)
         self.outbox.append(pack_runtime_exception(line, column, text, stamp_us=self._stamp_us()))
 
     def error(self, code: int, argument: int, text: str, *, is_violation: bool = False) -> None:
         """Say why the robot stops; the change of the safety mode that follows is told with the same code."""
         self.note(f"C{code}A{argument}: {text}")
+        self.remarks.append(f"C{code}A{argument}: {text}"[:N_SHOWN])
         self._report(code, argument, text, ReportLevel.VIOLATION if is_violation else ReportLevel.WARNING)
         self._why = code, argument
 

@@ -91,10 +91,10 @@ class Machine:
             self.external_wrench = [float(v) for v in value]  # pyright: ignore[reportGeneralTypeIssues,reportArgumentType] -- six by its type
 
     def tool_acceleration(self) -> tuple[float, float, float]:
-        """Return what an accelerometer in the tool reads: gravity, turned into the flange's axes (m/s²)."""
+        """Return what an accelerometer in the flange reads: how it moves, and gravity, in its own axes (m/s²)."""
         if self._acceleration_slice != self.drive.n_slices:
             T_bf = self.drive.kinematics.forward(self.drive.measured.q_rad)
-            x, y, z = (T_bf[:3, :3].T @ self.gravity).tolist()
+            x, y, z = (T_bf[:3, :3].T @ (self.drive.measured.acceleration + self.gravity)).tolist()
             self._acceleration_slice, self._acceleration = self.drive.n_slices, (x, y, z)
         return self._acceleration
 

@@ -55,11 +55,13 @@ _RAISES: dict[Event, tuple[Condition, Reaction]] = {
     Event.SAFEGUARD_OPENED: (Condition.SAFEGUARD, _GUARD),
     Event.PROTECTIVE_STOP: (Condition.PROTECTIVE, _PROTECT),
     Event.REDUCED: (Condition.REDUCED, _NONE),
+    Event.RECOVERY: (Condition.RECOVERY, _NONE),
 }
 _RELEASES = {
     Event.SYSTEM_ESTOP_RELEASED: Condition.SYSTEM_ESTOP,
     Event.ROBOT_ESTOP_RELEASED: Condition.ROBOT_ESTOP,
     Event.REDUCED_ENDED: Condition.REDUCED,
+    Event.RECOVERED: Condition.RECOVERY,
 }
 
 
@@ -122,9 +124,10 @@ class Modes:
 
     Args:
         times: How long things take.
-        needs_safeguard_reset: A safeguard that closes waits for its reset; otherwise the program resumes by itself.
+        needs_safeguard_reset: See there.
 
     Attributes:
+        needs_safeguard_reset: A safeguard that closes waits for its reset; otherwise the program resumes by itself.
         robot: Robot mode.
         runtime: State of the program.
         is_remote: Remote control is on; who serves remote commands asks.
@@ -137,7 +140,7 @@ class Modes:
 
     def __init__(self, *, times: PowerTimes | None = None, needs_safeguard_reset: bool = False) -> None:
         self.times = times or PowerTimes()
-        self._needs_reset = needs_safeguard_reset
+        self.needs_safeguard_reset = needs_safeguard_reset
         self.robot = RobotMode.POWER_OFF
         self.runtime = RuntimeState.STOPPED
         self.is_remote = True
@@ -168,6 +171,11 @@ class Modes:
     def is_reduced(self) -> bool:
         """Reduced limits hold."""
         return Condition.REDUCED in self._conditions
+
+    @property
+    def is_recovering(self) -> bool:
+        """The arm is beyond its limits: it is moved by hand only."""
+        return Condition.RECOVERY in self._conditions
 
     @property
     def may_move(self) -> bool:
@@ -310,6 +318,7 @@ class Modes:
 
     def _power_off(self) -> None:
         self.robot = RobotMode.POWER_OFF
+        self._conditions.discard(Condition.RECOVERY)
         self._due, self._cut_at, self._wants_running, self._was_playing = None, None, False, False
 
     def _lose_power(self) -> Reaction:
@@ -326,7 +335,7 @@ class Modes:
 
     def _close_guard(self) -> Reaction:
         self._is_guard_open = False
-        return _NONE if self._needs_reset else self._clear_guard()
+        return _NONE if self.needs_safeguard_reset else self._clear_guard()
 
     def _reset_guard(self) -> Reaction:
         if self._is_guard_open:

@@ -30,7 +30,6 @@ _NOT_THERE = (
     "tool_output_current",
     "actual_robot_energy_consumed",
     "actual_robot_braking_energy_dissipated",
-    "joint_position_deviation_ratio",
     "collision_detection_ratio",
 )
 _NOT_COUNTED = (
@@ -130,6 +129,7 @@ def _measured(machine: Machine) -> Getters:
         "actual_TCP_pose": lambda: drive.measured.tcp_pose.tolist(),
         "actual_TCP_speed": lambda: drive.measured.tcp_speed.tolist(),
         "actual_tool_accelerometer": machine.tool_acceleration,
+        "joint_position_deviation_ratio": lambda: drive.deviation_ratio,
         "actual_robot_current": lambda: robot_current_a(drive.measured),
         "elbow_position": lambda: elbow(kinematics.rows, drive.measured.q_rad),
         "elbow_velocity": lambda: elbow_velocity(kinematics.rows, drive.measured.q_rad, drive.measured.qd_rad_s),

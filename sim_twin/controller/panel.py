@@ -42,7 +42,7 @@ _JOINTS_C: Vec6 = (JOINT_C, JOINT_C, JOINT_C, JOINT_C, JOINT_C, JOINT_C)
 _ROW = struct.Struct(">4d")
 _NOT_CALIBRATED, _CALIBRATED = 0, 2
 """UR's controller calls them "not initialised" and "linearised"; 1 is "not linearised"."""
-_POSITION, _TEACH, _FORCE = 0, 1, 2
+_POSITION, _TEACH, _FORCE, _TORQUE = 0, 1, 2, 3
 
 
 class Panel:
@@ -281,7 +281,10 @@ class Panel:
         )
 
     def _control_mode(self) -> int:
-        core = self._machine.drive.core
+        drive = self._machine.drive
+        core = drive.core
+        if drive.is_led_by_torque:
+            return _TORQUE
         return _TEACH if core.is_free else _POSITION if core.force_task is None else _FORCE
 
     def _kinematics_info(self) -> KinematicsInfo:

@@ -17,9 +17,11 @@ __all__ = ["UNNAMED", "Programs"]
 UNNAMED = "unnamed"
 SECONDARY = "SECONDARY_PROGRAM_EXCEPTION_XXX"
 """What a robot puts before the reason for which a secondary program failed."""
+BEYOND = "the arm is beyond a limit or a plane (recovery mode); jog it back first"
 STOPPED_BEFORE = "it was stopped before it began"
 _TAKES_BACK = frozenset(Event) - {
     Event.PLAY, Event.PAUSE, Event.STOP, Event.PROGRAM_ENDED, Event.REDUCED, Event.REDUCED_ENDED,
+    Event.RECOVERED,
 }  # fmt: skip
 """After a stop, a loss of power and the way back from them nothing may begin that was sent before, or the arm would
 move by itself once somebody has released a button. What a program or its watchdog brings about is not among them."""
@@ -71,14 +73,15 @@ class Programs:
             return None
         return f"no program can start in mode {modes.robot.name}, safety mode {modes.safety.name}"
 
-    def submit(self, text: str, *, is_remote: bool = False) -> Start:
+    def submit(self, text: str, *, is_remote: bool = False, is_by_hand: bool = False) -> Start:
         """Take a program's text: a `def` replaces the one that runs, a `sec` runs beside it. Tells what comes of it.
 
         Args:
             text: The program.
             is_remote: It came from elsewhere, under remote control.
+            is_by_hand: Somebody at the arm moves it so, which works in the recovery mode too.
         """
-        start = Start(n_stops=self._n_stops[is_remote], is_remote=is_remote)
+        start = Start(n_stops=self._n_stops[is_remote], is_remote=is_remote, is_by_hand=is_by_hand)
         if len(text) > N_PROGRAM_CHARS:
             too_long = f"expected a program of at most {N_PROGRAM_CHARS} characters, got {len(text)}"
             self._take(Mistake(message=too_long), start)
@@ -186,7 +189,8 @@ class Programs:
         if runtime is not RuntimeState.STOPPED:
             return
         self._next = None
-        refusal = self.handle(Event.PLAY).refusal
+        is_closed = self._machine.modes.is_recovering and not start.is_by_hand
+        refusal = BEYOND if is_closed else self.handle(Event.PLAY).refusal
         if refusal is not None:
             self._turn_down(program, start, refusal)
             return

@@ -12,14 +12,17 @@ from robot.kinematics import Kinematics
 from robot.layout import draw_layout
 from sim_twin.controller.box import Box
 from sim_twin.controller.builtins import program_builtins
-from sim_twin.controller.compiling import Compiler, InlineCompiler, MakeBuiltins
+from sim_twin.controller.compiling import Compiler, InlineCompiler, MakeBuiltins, Mistake, compile_text
 from sim_twin.controller.hand import Hand
 from sim_twin.controller.machine import Machine
 from sim_twin.controller.motion import SLICE_S, Breach, Measured
-from sim_twin.controller.motion.limits import Cause
+from sim_twin.controller.motion.poses import Array
 from sim_twin.controller.outputs import make_outputs
 from sim_twin.controller.panel import Panel
 from sim_twin.controller.program import Programs
+from sim_twin.controller.safety_terminals import SafetyTerminals
+from sim_twin.controller.script import Builtins
+from sim_twin.controller.script.builtins import Sockets
 from sim_twin.controller.states import Event, RobotMode, RuntimeState
 from sim_twin.controller.watchdogs import WatchdogAction
 from sim_twin.controller.wire import ControllerVersion, ScriptSource
@@ -27,6 +30,8 @@ from sim_twin.plant import TwinWorld
 
 __all__ = ["VirtualRobot", "make_world"]
 
+JOG_RAD_S, RECOVERY_RAD_S = 0.5, 0.25
+"""The latter keeps the tool below the 250 mm/s of UR's recovery mode."""
 _PROTECTIVE_BIT, _VIOLATION_BIT = 1 << 2, 1 << 8
 _STARVED = {WatchdogAction.PAUSE: Event.PAUSE, WatchdogAction.STOP: Event.STOP}
 
@@ -53,6 +58,7 @@ class VirtualRobot:
         is_powered: Begin with power on and brakes open.
         cell: How the table is wired to the control box; straight through where None.
         compiler: Makes programs of texts from builtins; inline, and so deterministic, where absent.
+        safety: Safety inputs of the installation; none where absent.
 
     Attributes:
         machine: Drive, modes, registers, terminals.
@@ -62,6 +68,7 @@ class VirtualRobot:
         panel: wire.DashboardTarget and wire.StateSource.
         disturb: Fault: what becomes of a measurement before anybody sees it.
         box: The wires between table and terminals.
+        safety: As given.
         forced_inputs: Fault: input bits that are on whatever the table says.
     """
 
@@ -73,10 +80,13 @@ class VirtualRobot:
         is_powered: bool = True,
         cell: CellConfig | None = None,
         compiler: Callable[[MakeBuiltins], Compiler] = InlineCompiler,
+        safety: SafetyTerminals | None = None,
     ) -> None:
         self.machine = Machine(world, version=version or ControllerVersion())
-        self.programs = Programs(self.machine, compiler(lambda sockets: program_builtins(self.machine, sockets)))
+        self.programs = Programs(self.machine, compiler(self._make_builtins))
+        self.safety = safety or SafetyTerminals()
         modes = self.machine.modes
+        modes.needs_safeguard_reset = self.safety.needs_safeguard_reset
         self.hand = Hand(world, is_powered=lambda: modes.robot not in (RobotMode.POWER_OFF, RobotMode.NO_CONTROLLER))
         self.outputs = make_outputs(self.machine, self.programs)
         self.panel = Panel(self.machine, self.programs)
@@ -114,10 +124,10 @@ class VirtualRobot:
         if breach is not None:
             self._stop_for(breach)
         self.programs.obey(machine.modes.tick(is_standing=drive.is_standing))
-        if drive.is_braked and machine.modes.may_move and machine.modes.robot is RobotMode.RUNNING:
-            drive.engage()  # the brakes came in because it pressed on while it was stopped, and it is released
+        self._look_outside()
         machine.n_standing = machine.n_standing + 1 if drive.is_standing else 0
-        machine.io.digital_in = self.box.sense(machine.world.table.read_inputs()) | self.forced_inputs
+        table = self.box.sense(machine.world.table.read_inputs()) | self.forced_inputs
+        machine.io.digital_in = self.safety.sense(table)
         machine.io.analog_in_v = self.box.measure(machine.world.table.travel)
         self.hand.tick()
         machine.journal.end_slice()
@@ -144,6 +154,17 @@ class VirtualRobot:
             drive.engage()
         self.hand.open()
 
+    def mistake_in(self, text: str) -> Mistake | None:
+        """Return why a text is no program for this controller; None where it is one."""
+        made = compile_text(text, self._make_builtins)
+        if isinstance(made, Mistake):
+            return made
+        made.close()
+        return None
+
+    def _make_builtins(self, sockets: Sockets) -> Builtins:
+        return program_builtins(self.machine, sockets)
+
     def close(self) -> None:
         """End programs and their connections."""
         self.programs.close()
@@ -158,11 +179,25 @@ class VirtualRobot:
             machine.journal.note(f"watchdog: {name} was not written in time, the program is to {action.value}")
             self.programs.handle(_STARVED[action])
 
+    def _look_outside(self) -> None:
+        """Begin the recovery mode where the arm has power beyond its limits, and end it once it is back."""
+        modes = self.machine.modes
+        if modes.robot is RobotMode.RUNNING and self.machine.drive.is_outside is not modes.is_recovering:
+            self.programs.handle(Event.RECOVERED if modes.is_recovering else Event.RECOVERY)
+
+    def jog(self, by_rad: Array) -> str | None:
+        """Move the joints by as much as somebody at the pendant does, or tell why that cannot be.  (6,)"""
+        refusal = self.programs.refusal
+        if refusal is not None:
+            return refusal
+        speed = RECOVERY_RAD_S if self.machine.modes.is_recovering else JOG_RAD_S
+        q = (self.machine.drive.measured.q_rad + by_rad).tolist()
+        self.programs.submit(f"def jog():\n movej({q}, a=1.0, v={speed})\nend\n", is_by_hand=True)
+        return None
+
     def _stop_for(self, breach: Breach) -> None:
         cause = breach.cause
-        bits = self.machine.modes.safety_status_bits
-        is_pressing_still = cause is Cause.FORCE_VIOLATION and bits & _PROTECTIVE_BIT
-        if is_pressing_still or bits & (_VIOLATION_BIT if cause.is_violation else _PROTECTIVE_BIT):
+        if self.machine.modes.safety_status_bits & (_VIOLATION_BIT if cause.is_violation else _PROTECTIVE_BIT):
             # What presses goes on pressing while the arm comes to rest: one blow is one stop.
             return
         argument = cause.value[1] if breach.joint is None else breach.joint

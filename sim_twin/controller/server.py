@@ -20,10 +20,12 @@ from sim_twin.controller.motion import SLICE_S
 from sim_twin.controller.pacing import Pacer
 from sim_twin.controller.planes import PlaneNumbers, planes_of
 from sim_twin.controller.robot import VirtualRobot, make_world
+from sim_twin.controller.safety_terminals import SafetyTerminals
 from sim_twin.controller.ticks import TickTimes
 from sim_twin.controller.trace import TraceWriter
 from sim_twin.controller.wire import ControllerVersion, Wires
 from sim_twin.controller.wire.reactor import Reactor
+from sim_twin.controller.wire.rtde_codec import Level
 
 __all__ = ["PRIORITY", "ControllerServer", "Setup", "parse_version"]
 
@@ -55,6 +57,8 @@ class Setup(msgspec.Struct, frozen=True, kw_only=True):
     """Texts of programs that the dashboard can load, by the name that it loads them by."""
     cell: str = ""
     """A shipped cell's name or a path: how the table is wired to the control box; straight through where empty."""
+    safety_inputs: dict[str, str] = {}
+    """Terminals by safety function, such as system_estop: CI0; see safety_terminals.py."""
     planes: tuple[PlaneNumbers, ...] = ()
     """Safety planes of the installation: normal (base frame) and offset along it (m); the tool stays on its side."""
     bus: str = ""
@@ -82,6 +86,19 @@ def parse_version(text: str) -> ControllerVersion:
     return version
 
 
+def _check_script(robot: VirtualRobot, text: str) -> None:
+    """Refuse a script that is no program for this controller, with the line at fault.
+
+    Raises:
+        ValueError: it is none.
+    """
+    mistake = robot.mistake_in(text)
+    if mistake is not None:
+        lines = text.splitlines()
+        at = f"; that line is {lines[mistake.line - 1].strip()!r}" if 0 < mistake.line <= len(lines) else ""
+        raise ValueError(f"script: {mistake.message}{at}")
+
+
 class ControllerServer:
     """One virtual controller on its ports.
 
@@ -95,7 +112,8 @@ class ControllerServer:
         ticks: What slices cost.
 
     Raises:
-        ValueError: the host is no loopback address and that is not allowed, or the version or a plane is none.
+        ValueError: the host is no loopback address and that is not allowed, or the version, a plane, a safety input or
+            the script is none.
     """
 
     def __init__(self, setup: Setup) -> None:
@@ -112,8 +130,11 @@ class ControllerServer:
         if cell is not None:
             check_cell_fits(world.scenario, cell, setup.cell)
         self.robot = robot = VirtualRobot(
-            world, version=version, is_powered=setup.is_powered, cell=cell, compiler=ThreadCompiler
-        )
+            world, version=version, is_powered=setup.is_powered, cell=cell, compiler=ThreadCompiler,
+            safety=SafetyTerminals(setup.safety_inputs),
+        )  # fmt: skip
+        if setup.script:
+            _check_script(robot, setup.script)
         drive = robot.machine.drive
         drive.limits = msgspec.structs.replace(drive.limits, planes=planes)
         robot.programs.shelf.update(setup.shelf)
@@ -126,6 +147,7 @@ class ControllerServer:
             gripper=robot.hand,
             version=version,
             stamp_us=lambda: robot.machine.stamp_us,
+            hear=robot.machine.journal.note,
         )
         self.ticks = TickTimes()
         self.faults = Faults(robot, self.wires, self.ticks, seed=setup.seed)
@@ -184,6 +206,9 @@ class ControllerServer:
             outbox = self.robot.machine.journal.outbox
             while outbox:
                 self.wires.states.tell(outbox.popleft())
+            remarks = self.robot.machine.journal.remarks
+            while remarks:
+                self.wires.rtde.say(remarks.popleft(), level=Level.ERROR, source="Controller")
             self.wires.tick(self.robot.machine.drive.n_slices)
             if self._bus is not None:
                 self._bus.tick(self.robot.machine.drive.n_slices)

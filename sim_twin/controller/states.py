@@ -90,6 +90,9 @@ class Event(Enum):
     RESTART_SAFETY = auto()
     REDUCED = auto()
     REDUCED_ENDED = auto()
+    RECOVERY = auto()
+    """The arm has power beyond its limits."""
+    RECOVERED = auto()
 
 
 class MotionOrder(Enum):
@@ -150,4 +153,5 @@ class Condition(Enum):
     ROBOT_ESTOP = (SafetyMode.ROBOT_EMERGENCY_STOP, 6)
     SAFEGUARD = (SafetyMode.SAFEGUARD_STOP, 4)
     PROTECTIVE = (SafetyMode.PROTECTIVE_STOP, 2)
+    RECOVERY = (SafetyMode.RECOVERY, 3)
     REDUCED = (SafetyMode.REDUCED, 1)

@@ -2,7 +2,7 @@
 
 from sim_twin.controller.motion.contact import ContactWatch
 from sim_twin.controller.motion.core import Motion, MotionConflictError, MotionCore
-from sim_twin.controller.motion.drive import Measured, TwinDrive
+from sim_twin.controller.motion.drive import TwinDrive
 from sim_twin.controller.motion.force import ForceKind, ForceTask
 from sim_twin.controller.motion.kinematics import (
     ArmKinematics,
@@ -14,6 +14,7 @@ from sim_twin.controller.motion.kinematics import (
     dh_rows,
 )
 from sim_twin.controller.motion.limits import Breach, Cause, Plane, SafetyLimits, default_limits
+from sim_twin.controller.motion.measured import Measured
 from sim_twin.controller.motion.motions import Motions
 from sim_twin.controller.motion.paths import PathError
 from sim_twin.controller.motion.poses import pose_inv, pose_trans

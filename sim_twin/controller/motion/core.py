@@ -17,13 +17,11 @@ from sim_twin.controller.motion.poses import Array, matrix_from_pose, pose_from_
 from sim_twin.controller.motion.profiles import Residual, Trapezoid, way_back
 from sim_twin.controller.motion.servo import limited
 from sim_twin.controller.motion.setpoint import SLICE_S, Pace, SetPoint
+from sim_twin.controller.motion.stopping import stop_time_s
 from sim_twin.controller.motion.tails import Motion, MotionConflictError, Sensed, Tail
 
-__all__ = ["STOP_RAD_S2", "Motion", "MotionConflictError", "MotionCore", "Sensed", "Tail"]
+__all__ = ["Motion", "MotionConflictError", "MotionCore", "Sensed", "Tail"]
 
-STOP_RAD_S2 = np.array([25.0, 8.4, 45.0, 45.0, 45.0, 45.0])
-"""With 35 ms of the servo's lag a stop from full speed takes what UR publishes for the CB3 UR5 (J0 0.31 rad in 244 ms,
-J1 0.70 in 530, J2 0.22 in 164; UR5e has graphs only). The wrists have no figures: they stop as the elbow does."""
 REST_RAD_S2 = 10.0
 """Deceleration of a motion that its program abandoned."""
 STILL_RAD_S = 1e-6
@@ -333,7 +331,7 @@ class MotionCore:
             self.begin_stop()
 
     def _stopping(self, speed: Array) -> Motion:
-        stop_s = float((np.abs(speed) / STOP_RAD_S2).max())
+        stop_s = stop_time_s(speed)
         left, q = stop_s, self.setpoint.q_target
         while left > 0.0:
             now = max(0.0, left - SLICE_S)

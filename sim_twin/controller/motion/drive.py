@@ -3,35 +3,43 @@
 from collections import deque
 from collections.abc import Sequence
 
-import msgspec
 import mujoco
 import numpy as np
 
 from sim_twin.controller.motion.contact import ContactWatch
 from sim_twin.controller.motion.core import MotionCore
+from sim_twin.controller.motion.feeling import Feeling
 from sim_twin.controller.motion.kinematics import ArmKinematics, KinematicsError, dh_rows
 from sim_twin.controller.motion.limits import (
     Asked,
     Breach,
     Cause,
-    Felt,
     SafetyLimits,
     breach_asked,
     breach_felt,
     default_limits,
+    is_outside,
 )
+from sim_twin.controller.motion.measured import Measured, flange_velocity
 from sim_twin.controller.motion.motions import Motions
-from sim_twin.controller.motion.poses import Array, length, pose_from_matrix, vec6
+from sim_twin.controller.motion.poses import Array, pose_from_matrix, vec6
 from sim_twin.controller.motion.setpoint import SLICE_S
-from sim_twin.controller.motion.wrench import GRAVITY_M_S2, NM_PER_A, ContactWrench, is_same_payload, payload_bias
+from sim_twin.controller.motion.stopping import stop_path
+from sim_twin.controller.motion.wrench import (
+    GRAVITY_M_S2,
+    NM_PER_A,
+    ContactWrench,
+    is_same_payload,
+    payload_bias,
+)
 from sim_twin.controller.states import MotionOrder
 from sim_twin.plant import TwinWorld
 
-__all__ = ["Measured", "TwinDrive", "servo_lag_s"]
+__all__ = ["TwinDrive", "servo_lag_s"]
 
 BRAKE_NM = np.array([60.0, 35.0, 20.5, 6.0, 6.0, 6.0])
 """Torque of brakes that stop a moving arm: with the twin's own tool its distances are those that UR publishes for the
-CB3 UR5's category 0 stop (see core.STOP_RAD_S2)."""
+CB3 UR5's category 0 stop (see stopping.STOP_RAD_S2)."""
 HOLD_NM = np.array([150.0, 150.0, 150.0, 28.0, 28.0, 28.0])
 """Torque of brakes that hold a standing one."""
 HELD_RAD_S = 0.005
@@ -42,25 +50,6 @@ MOST_TOLD_KG, MOST_TOLD_M = 100.0, 10.0
 """Numbers beyond these are a slip, and great ones would overflow to a force that no limit compares with."""
 
 
-class Measured(msgspec.Struct, frozen=True, kw_only=True):
-    """What the arm measured after a slice. Arrays of their own; base axes, SI units."""
-
-    q_rad: Array
-    qd_rad_s: Array
-    tcp_pose: Array
-    """UR pose of the tool that the program set."""
-    tcp_speed: Array
-    """(v, w) of it."""
-    wrench: Array
-    """Force and torque of the world on the tool, at the tool; payload as told taken off, zeroed."""
-    torque_nm: Array
-    """Of the joints, weight included."""
-    current_a: Array
-    """Torque over a constant of each joint."""
-    external_nm: Array
-    """Torque on the joints from contacts."""
-
-
 def servo_lag_s(model: mujoco.MjModel, actuator: int, *, tick_s: float) -> float:
     """Return how far a joint of the twin trails a ramp of set-points: damping over stiffness, delay, half a tick."""
     stiffness, damping = -float(model.actuator_biasprm[actuator, 1]), -float(model.actuator_biasprm[actuator, 2])
@@ -68,8 +57,9 @@ def servo_lag_s(model: mujoco.MjModel, actuator: int, *, tick_s: float) -> float
 
 
 MOST_EXTRA_KG = 20.0
-FELT_S = 0.02
-"""Time constant of the forces and speeds that limits are judged by. A guess: UR publishes none."""
+GIVE_WAY_S = 0.25
+"""For as long as a stop takes a collision leads the joints; after that they hold against whatever presses."""
+_CONTACTS = (Cause.TOOL_COLLISION, Cause.JOINT_COLLISION, Cause.DEVIATION)
 
 
 class TwinDrive:
@@ -119,6 +109,9 @@ class TwinDrive:
         self.n_slices = 0
         self._torque_nm: Array | None = None
         self._is_compliant = False
+        self._feeling = Feeling()
+        self._n_struck = 0
+        self._velocity = np.zeros(3)
         self.lock()
         self.measured = self._read()
 
@@ -136,7 +129,7 @@ class TwinDrive:
         model.dof_frictionloss[:6] = BRAKE_NM
         model.dof_solimp[:6, :2] = BRAKE_SOLIMP
         self.is_braked = True
-        self._feel_anew()
+        self._feeling.begin(self.world.data.qvel[:6].copy())
         self._seat()
 
     def engage(self) -> None:
@@ -145,7 +138,7 @@ class TwinDrive:
         self._give_servos()
         model.dof_frictionloss[:6] = 0.0
         self.is_braked = False
-        self._feel_anew()
+        self._feeling.begin(self.world.data.qvel[:6].copy())
         self._seat()
 
     def put_torque(self, torque_nm: Sequence[float] | Array) -> None:
@@ -194,11 +187,6 @@ class TwinDrive:
             self.core.hold(q)
         else:
             self.core.catch(q, moving_rad_s)
-
-    def _feel_anew(self) -> None:
-        """Forget what was felt before the power was cut or given."""
-        self._felt_force_n, self._felt_nm = 0.0, np.zeros(6)
-        self._felt_rad_s, self._felt_m_s = self.world.data.qvel[:6].copy(), 0.0
 
     # ------------------------------------------------------------------------------------------------------ sensing
 
@@ -277,12 +265,20 @@ class TwinDrive:
         self._history.append(self.measured.q_rad)
         self.contact.push(self.measured.wrench[:3], self.measured.tcp_speed[:3])
         if breach is None and not self.is_braked:
-            felt = self._felt()
+            felt = self._feeling.take(self.measured, self._expected, self.limits.tool_force_n)
             # Nobody asked for where torques lead: what is measured is judged as what is asked.
             breach = breach_felt(self.limits, felt) or (None if torque_nm is None else self._led_beyond())
             if breach is not None:
-                self.stop(is_cut=breach.cause.is_violation)
+                self._stop_for(breach.cause)
+            self._n_struck = self._n_struck + 1 if breach is not None and breach.cause in _CONTACTS else 0
         return breach
+
+    def _stop_for(self, cause: Cause) -> None:
+        """Stop for what was felt. What struck something stops from where that held it, and does not press on."""
+        if cause in _CONTACTS and not self._is_compliant and self._n_struck * SLICE_S < GIVE_WAY_S:
+            self._seat(self.measured.qd_rad_s)
+        else:
+            self.stop(is_cut=cause.is_violation)
 
     def stop(self, *, is_cut: bool = False) -> None:
         """Stop as fast as the arm may and hold, or cut the drives and brake."""
@@ -310,8 +306,23 @@ class TwinDrive:
 
     @property
     def is_standing(self) -> bool:
-        """Set-point and joints are at rest."""
-        return self.motions.setpoint.fastest_rad_s < 1e-6 and float(np.abs(self.measured.qd_rad_s).max()) < 0.01
+        """Set-point and joints are at rest, whatever is read of them."""
+        return self.motions.setpoint.fastest_rad_s < 1e-6 and float(np.abs(self.world.data.qvel[:6]).max()) < 0.01
+
+    @property
+    def is_led_by_torque(self) -> bool:
+        """A program's torques move the joints."""
+        return self._is_compliant
+
+    @property
+    def deviation_ratio(self) -> float:
+        """How far the joints are off where the servos should have brought them; at 1 that is a stop (C153)."""
+        return float(np.abs(self._expected - self.measured.q_rad).max()) / self.limits.deviation_rad
+
+    @property
+    def is_outside(self) -> bool:
+        """The arm stands beyond a joint's limit or a plane by more than its tolerance."""
+        return is_outside(self.limits, self.measured.q_rad, self.measured.tcp_pose[:3])
 
     def _drive(self) -> Breach | None:
         core, setpoint = self.core, self.motions.setpoint
@@ -328,6 +339,7 @@ class TwinDrive:
                 qd_rad_s=setpoint.qd_target,
                 tool_m=self._asked_tool_m(),
                 tool_before_m=before_m,
+                tool_stop_m=self._stop_m(setpoint.q_target, setpoint.qd_target),
             )
             breach = breach_asked(self.limits, asked)
         if breach is not None:
@@ -340,6 +352,12 @@ class TwinDrive:
         """Where the set-point brings the tool."""
         return self.core.tool_at(self.motions.setpoint.q_target)[:3, 3]
 
+    def _stop_m(self, q_rad: Array, qd_rad_s: Array) -> tuple[Array, ...]:
+        """Return where a stop that began now would bring the tool, half-way and at its end, where planes ask for it."""
+        if not self.limits.planes:
+            return ()
+        return tuple(self.core.tool_at(q)[:3, 3] for q in stop_path(q_rad, qd_rad_s))
+
     def _led_beyond(self) -> Breach | None:
         now = self.measured
         tool_m = now.tcp_pose[:3]
@@ -348,29 +366,9 @@ class TwinDrive:
             qd_rad_s=now.qd_rad_s,
             tool_m=tool_m,
             tool_before_m=tool_m - now.tcp_speed[:3] * SLICE_S,
+            tool_stop_m=self._stop_m(now.q_rad, now.qd_rad_s),
         )
         return breach_asked(self.limits, led)
-
-    def _felt(self) -> Felt:
-        """What the limits are judged by. Forces and speeds are smoothed.
-
-        A blow of a millisecond passes through no real sensor, and a servo's overshoot is no runaway.
-        """
-        now = self.measured
-        share = SLICE_S / (SLICE_S + FELT_S)
-        self._felt_force_n += share * (length(now.wrench[:3]) - self._felt_force_n)
-        self._felt_nm += share * (now.external_nm - self._felt_nm)
-        self._felt_rad_s += share * (now.qd_rad_s - self._felt_rad_s)
-        self._felt_m_s += share * (length(now.tcp_speed[:3]) - self._felt_m_s)
-        return Felt(
-            q_rad=now.q_rad,
-            qd_rad_s=self._felt_rad_s,
-            q_expected_rad=self._expected,
-            tool_m=now.tcp_pose[:3],
-            tool_speed_m_s=self._felt_m_s,
-            force_n=self._felt_force_n,
-            external_nm=self._felt_nm,
-        )
 
     def _read(self) -> Measured:
         model, data = self.world.model, self.world.data
@@ -380,12 +378,16 @@ class TwinDrive:
         wrench = self._contacts.at(model, data, tool_m) - self._zero
         if not is_same_payload(self._payload, self._real_payload):
             wrench += payload_bias(self.kinematics.forward(q), tool_m, self._real_payload, self._payload)
-        torque = data.qfrc_actuator[:6] + data.qfrc_gravcomp[:6]
+        velocity = flange_velocity(T_bt, J @ qd, self.core.T_ft)
+        acceleration, self._velocity = (velocity - self._velocity) / SLICE_S, velocity
+        # Brakes hold without power, and the twin carries the weight whatever does.
+        torque = np.zeros(6) if self.is_braked else data.qfrc_actuator[:6] + data.qfrc_gravcomp[:6]
         return Measured(
             q_rad=q,
             qd_rad_s=qd,
             tcp_pose=pose_from_matrix(T_bt),
             tcp_speed=J @ qd,
+            acceleration=acceleration,
             wrench=wrench,
             torque_nm=torque,
             current_a=torque / NM_PER_A,

@@ -3,7 +3,8 @@
 Two tiers, as on a robot: what is *asked* beyond a limit brings a protective stop, and what is *measured* beyond a
 limit and its tolerance (the trueness of the e-Series' safety functions) is a violation and cuts the drives. Measured
 speeds, which a servo's overshoot takes beyond what was asked, have both: a protective stop beyond the tolerance, a
-violation where they run away.
+violation where they run away. A force is a collision and so a protective stop, however hard the blow; a violation is
+what goes on pressing after it. Who stands beyond a limit or a plane may stand there and come back.
 """
 
 import math
@@ -17,7 +18,20 @@ from config.arm import ArmConfig
 from sim_twin.controller.motion.poses import Array
 from sim_twin.controller.motion.setpoint import SLICE_S
 
-__all__ = ["Asked", "Breach", "Cause", "Felt", "Plane", "SafetyLimits", "breach_asked", "breach_felt", "default_limits"]
+__all__ = [
+    "FORCE_TOLERANCE_N",
+    "PRESSED_S",
+    "Asked",
+    "Breach",
+    "Cause",
+    "Felt",
+    "Plane",
+    "SafetyLimits",
+    "breach_asked",
+    "breach_felt",
+    "default_limits",
+    "is_outside",
+]
 
 ROUNDING = 1e-9
 JUMP_SPEEDS = 2.0
@@ -28,6 +42,10 @@ JOINT_SPEED_TOLERANCE_RAD_S = float(np.radians(1.15))
 PLANE_TOLERANCE_M = 0.040
 SPEED_TOLERANCE_M_S = 0.050
 FORCE_TOLERANCE_N = 25.0
+PRESSED_S = 0.5
+"""What presses for so long was not ended by the stop, which takes less. A guess: UR publishes no figure."""
+FURTHER_RAD_S, FURTHER_M_S = 0.01, 0.005
+"""Who goes further than this beyond a limit does not merely stand there."""
 # Measured speeds beyond these are violations; the figures that UR's pendant shows beside its limits, recalled.
 JOINT_RUNAWAY_RAD_S = float(np.radians(11.0))
 TOOL_RUNAWAY_M_S = 0.150
@@ -116,6 +134,8 @@ class Asked(msgspec.Struct, frozen=True, kw_only=True):
     """Where it brings the tool."""
     tool_before_m: Array
     """Where the slice before brought it."""
+    tool_stop_m: tuple[Array, ...] = ()
+    """Where a stop that began now would bring it; needed where there are planes."""
 
 
 class Felt(msgspec.Struct, frozen=True, kw_only=True):
@@ -125,8 +145,12 @@ class Felt(msgspec.Struct, frozen=True, kw_only=True):
     qd_rad_s: Array
     q_expected_rad: Array
     tool_m: Array
+    tool_velocity_m_s: Array
+    """Base axes."""
     tool_speed_m_s: float
     force_n: float
+    pressed_s: float
+    """For how long that force has been beyond its limit and tolerance."""
     external_nm: Array
 
 
@@ -164,32 +188,56 @@ def breach_asked(limits: SafetyLimits, asked: Asked) -> Breach | None:
         text = f"target moves the tool at {tool_m_s:.2f} m/s, limit {limits.tool_speed_m_s:.2f}"
         return Breach(cause=Cause.TARGET_TOOL_SPEED, text=text)
     leaving = tuple(p for p in limits.planes if float(np.dot(p.normal, asked.tool_m - asked.tool_before_m)) < 0.0)
-    if _is_outside(leaving, asked.tool_m, 0.0):
+    if _is_beyond(leaving, asked.tool_m, 0.0):
         return Breach(cause=Cause.PLANE, text="target position is beyond a safety plane")
+    # Stopped any later the tool would come to rest beyond it.
+    if any(_is_beyond(leaving, tool_m, 0.0) for tool_m in asked.tool_stop_m):
+        return Breach(cause=Cause.PLANE, text="target moves too fast towards a safety plane to stop before it")
     return None
 
 
 def breach_felt(limits: SafetyLimits, felt: Felt) -> Breach | None:
-    """Return the first limit that a measurement passes, or None; violations come before protective stops."""
+    """Return the first limit that a measurement passes, or None; violations come before protective stops.
+
+    A force is no violation before it has lasted: its stop comes first.
+    """
     return _violation(limits, felt) or _collision(limits, felt)
 
 
 def _violation(limits: SafetyLimits, felt: Felt) -> Breach | None:
     q = felt.q_rad.tolist()
-    ranges = zip(q, limits.q_min_rad, limits.q_max_rad, strict=True)
-    i = _first(max(x - high, low - x) - JOINT_TOLERANCE_RAD for x, low, high in ranges)
+    ranges = zip(q, felt.qd_rad_s.tolist(), limits.q_min_rad, limits.q_max_rad, strict=True)
+    i = _first(_further(x, v, low, high) for x, v, low, high in ranges)
     if i is not None:
         return _breach(Cause.JOINT_VIOLATION, i, f"joint at {q[i]:.3f} rad is beyond its limit")
     too_fast = _too_fast(limits, felt, JOINT_RUNAWAY_RAD_S, Cause.JOINT_SPEED_VIOLATION)
     too_fast = too_fast or _tool_too_fast(limits, felt, TOOL_RUNAWAY_M_S, Cause.TOOL_SPEED_VIOLATION)
     if too_fast is not None:
         return too_fast
-    if _is_outside(limits.planes, felt.tool_m, PLANE_TOLERANCE_M):
+    further = [p for p in limits.planes if not float(np.dot(p.normal, felt.tool_velocity_m_s)) >= -FURTHER_M_S]
+    if _is_beyond(further, felt.tool_m, PLANE_TOLERANCE_M):
         return Breach(cause=Cause.PLANE_VIOLATION, text="tool is beyond a safety plane")
-    if felt.force_n > limits.tool_force_n + FORCE_TOLERANCE_N:
+    if felt.force_n > limits.tool_force_n + FORCE_TOLERANCE_N and felt.pressed_s >= PRESSED_S:
         text = f"force on the tool is {felt.force_n:.0f} N, limit {limits.tool_force_n:.0f}"
         return Breach(cause=Cause.FORCE_VIOLATION, text=text)
     return None
+
+
+def is_outside(limits: SafetyLimits, q_rad: Array, tool_m: Array) -> bool:
+    """Return whether the arm is beyond a joint's limit or a plane, and its tolerance: then only a person moves it.
+
+    (6,), (3,)
+    """
+    ranges = zip(q_rad.tolist(), limits.q_min_rad, limits.q_max_rad, strict=True)
+    beyond = (max(x - high, low - x) - JOINT_TOLERANCE_RAD for x, low, high in ranges)
+    return _first(beyond) is not None or _is_beyond(limits.planes, tool_m, PLANE_TOLERANCE_M)
+
+
+def _further(x: float, v: float, low: float, high: float) -> float:
+    """Return how far a joint that goes on is beyond its limit and tolerance; not a number where one is none."""
+    beyond = max(x - high, low - x) - JOINT_TOLERANCE_RAD
+    is_back = v <= FURTHER_RAD_S if x > high else v >= -FURTHER_RAD_S
+    return min(beyond, 0.0) if is_back else beyond
 
 
 def _too_fast(limits: SafetyLimits, felt: Felt, tolerance_rad_s: float, cause: Cause) -> Breach | None:
@@ -237,5 +285,5 @@ def _first(excess: Iterable[float]) -> int | None:
     return None
 
 
-def _is_outside(planes: Sequence[Plane], tool_m: Array, tolerance: float) -> bool:
+def _is_beyond(planes: Sequence[Plane], tool_m: Array, tolerance: float) -> bool:
     return any(not float(np.dot(p.normal, tool_m)) >= p.offset_m - tolerance for p in planes)

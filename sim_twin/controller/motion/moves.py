@@ -6,8 +6,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from sim_twin.controller.motion.core import Motion, MotionCore, Tail
+from sim_twin.controller.motion.kinematics import KinematicsError
 from sim_twin.controller.motion.paths import TURN_M_PER_RAD, ArcPath, JointPath, LinePath, Path, ToolPath, TrackedPath
-from sim_twin.controller.motion.poses import Array, matrix_from_pose, vec6
+from sim_twin.controller.motion.poses import Array, matrix_from_pose, pose_from_matrix, vec6
 from sim_twin.controller.motion.profiles import Residual, Trapezoid
 from sim_twin.controller.motion.setpoint import USED_SPEED
 
@@ -99,7 +100,12 @@ class Moves:
     def _along(
         self, tool_path: ToolPath, vat: tuple[float, float, float], residual: Residual | None, start: Array, r: float
     ) -> Motion:
-        path = TrackedPath(tool_path, start, self._core.kinematics, self._core.T_ft)
+        try:
+            path = TrackedPath(tool_path, start, self._core.kinematics, self._core.T_ft)
+        except KinematicsError:
+            # An end out of reach is the better reason.
+            self._core.joints_of(pose_from_matrix(tool_path.at(tool_path.length)))
+            raise
         yield from self._run(path, vat, residual, start, r)
 
     def _run(

@@ -5,7 +5,7 @@ import numpy as np
 
 from sim_twin.controller.motion.poses import Array
 
-__all__ = ["NM_PER_A", "ContactWrench", "is_same_payload", "payload_bias"]
+__all__ = ["NM_PER_A", "ContactWrench", "cross", "is_same_payload", "payload_bias"]
 
 NM_PER_A = np.array([13.6, 13.6, 13.6, 9.1, 9.1, 9.1])
 """Joint torque over motor current: a torque constant near 0.135 (0.09) Nm/A behind a gear of 101, as published
@@ -39,7 +39,7 @@ class ContactWrench:
             sign = 1.0 if sides[i, 1] else -1.0
             force = sign * (self._force[:3] @ R)
             total[:3] += force
-            total[3:] += sign * (self._force[3:] @ R) + _cross(data.contact.pos[i] - point_m, force)
+            total[3:] += sign * (self._force[3:] @ R) + cross(data.contact.pos[i] - point_m, force)
         return total
 
 
@@ -71,7 +71,7 @@ def payload_bias(T_bf: Array, point_m: Array, real: tuple[float, Array], known: 
     return np.array([0.0, 0.0, down_n, about_x_nm, about_y_nm, 0.0])
 
 
-def _cross(a: Array, b: Array) -> Array:
+def cross(a: Array, b: Array) -> Array:
     """Return a x b.  (3,), (3,) -> (3,)
 
     NumPy's own takes a hundred microseconds of a slice's two thousand.

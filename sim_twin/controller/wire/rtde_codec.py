@@ -124,6 +124,24 @@ def pack_text(message: str, *, source: str, level: Level, protocol: int) -> byte
     return frame(Kind.TEXT, bytes([len(said)]) + said + bytes([len(by)]) + by + bytes([level]))
 
 
+def unpack_text(payload: bytes, *, protocol: int) -> tuple[str, str, int]:
+    """Return message, source and level of a client's text message; protocol 1 has no source.
+
+    Raises:
+        MalformedError: It is shorter than it says.
+    """
+    if protocol == 1:
+        return (payload[1:].decode("utf-8", "replace"), "", payload[0]) if payload else ("", "", 0)
+    parts, at = [], 0
+    for _ in range(2):
+        n_bytes = payload[at] if at < len(payload) else len(payload)
+        parts.append(payload[at + 1 : at + 1 + n_bytes].decode("utf-8", "replace"))
+        at += 1 + n_bytes
+    if at >= len(payload):
+        raise MalformedError(f"expected a text, a source and a level, came {len(payload)} bytes")
+    return parts[0], parts[1], payload[at]
+
+
 def names_of(payload: bytes) -> list[str]:
     """Return the field names of a set-up; a trailing comma and blanks are allowed."""
     parts = payload.decode("ascii", "replace").split(",")

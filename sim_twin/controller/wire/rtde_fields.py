@@ -104,7 +104,6 @@ _SINCE: dict[str, _Since] = {
     "ft_raw_wrench": ((5, 9), None),
     "wrench_calc_from_currents": ((5, 9), None),  # about
     "tcp_offset": ((5, 9, 4), (3, 14, 3)),
-    "joint_position_deviation_ratio": ((5, 15), None),  # about
     "collision_detection_ratio": ((5, 15), None),  # about
     "time_scale_source": ((5, 17), None),  # about
     "actual_current_as_torque": ((5, 23), None),
@@ -113,7 +112,7 @@ _SINCE: dict[str, _Since] = {
     "target_gravity": ((5, 20), None),  # about
     "target_base_acceleration": ((5, 20), None),  # about
     "target_base_wrench": ((5, 20), None),  # about
-    "control_step": ((5, 20), None),  # about
+    "control_step": ((5, 26), None),  # as UR's client library says
     "actual_robot_energy_consumed": ((5, 15), None),  # about
     "actual_robot_braking_energy_dissipated": ((5, 15), None),  # about
     "tool_output_mode": ((5, 0), None),

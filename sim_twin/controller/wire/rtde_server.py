@@ -21,6 +21,7 @@ from sim_twin.controller.wire.rtde_codec import (
     names_of,
     pack_text,
     unpack_frequency,
+    unpack_text,
 )
 from sim_twin.controller.wire.rtde_fields import FieldType, Value, input_fields, output_fields
 from sim_twin.controller.wire.version import ControllerVersion
@@ -34,6 +35,8 @@ _N_NAMES_BYTES = 2048
 _N_RECIPES = 255
 _VERSION = struct.Struct(">4I")
 _SOURCE = "RTDE"
+_N_HEARD = 1000
+"""Text messages of one client that are kept; a flood of them would push everything else out of the log."""
 _ACCEPTED, _REFUSED = b"\x01", b"\x00"
 
 
@@ -57,6 +60,7 @@ class _Client:
         self.inputs: dict[int, Recipe] = {}
         self.rate_hz = 0.0
         self.is_started = False
+        self.n_heard = 0
 
     def package(self) -> bytes:
         """Return the next data package; only for a client with an output recipe."""
@@ -77,8 +81,16 @@ class RtdeServer:
     more costs that client its connection.
     """
 
-    def __init__(self, *, outputs: Outputs, inputs: InputSink, version: ControllerVersion) -> None:
-        self._outputs = outputs
+    def __init__(
+        self,
+        *,
+        outputs: Outputs,
+        inputs: InputSink,
+        version: ControllerVersion,
+        hear: Callable[[str], None] | None = None,
+    ) -> None:
+        """Store; hear takes what clients say in text messages."""
+        self._outputs, self._hear = outputs, hear
         self._sink = inputs
         self._version = version
         self._slices_a_cycle = round(_STEP_HZ / _OLD_HZ) if version.is_cb3 else 1
@@ -97,7 +109,7 @@ class RtdeServer:
             Kind.START: self._start,
             Kind.PAUSE: self._pause,
             Kind.DATA: self._write,
-            Kind.TEXT: lambda _client, _payload: None,
+            Kind.TEXT: self._take_text,
         }
 
     @property
@@ -140,9 +152,10 @@ class RtdeServer:
                 client.peer.stream(client.package())
 
     def say(self, message: str, *, level: Level = Level.INFO, source: str = _SOURCE) -> None:
-        """Send a text message to every client."""
+        """Send a text message to every client that is sent data: to others, whatever comes next is their answer."""
         for client in tuple(self._clients.values()):
-            self._say_to(client, message, level, source)
+            if client.is_started:
+                self._say_to(client, message, level, source)
 
     def reserve(self, names: Collection[str]) -> None:
         """Fault: let these inputs be in use by a field bus from now on; no names frees them again."""
@@ -157,6 +170,13 @@ class RtdeServer:
 
     def _say_to(self, client: _Client, message: str, level: Level, source: str = _SOURCE) -> None:
         client.peer.reply(pack_text(message, source=source, level=level, protocol=client.protocol))
+
+    def _take_text(self, client: _Client, payload: bytes) -> None:
+        if self._hear is None or client.n_heard >= _N_HEARD:
+            return
+        client.n_heard += 1
+        message, source, level = unpack_text(payload, protocol=client.protocol)
+        self._hear(f"RTDE client {source or 'without a name'}, level {level}: {message}")
 
     def _choose_protocol(self, client: _Client, payload: bytes) -> None:
         if len(payload) != 2:

@@ -44,9 +44,10 @@ class Wires:
         gripper: GripperTarget | None,
         version: ControllerVersion,
         stamp_us: Callable[[], int],
+        hear: Callable[[str], None] | None = None,
     ) -> None:
-        """Store; without a gripper its port stays shut."""
-        self.rtde = RtdeServer(outputs=outputs, inputs=inputs, version=version)
+        """Store; without a gripper its port stays shut, without hear what RTDE's clients say is lost."""
+        self.rtde = RtdeServer(outputs=outputs, inputs=inputs, version=version, hear=hear)
         self.states = StatePorts(states=states, scripts=scripts, version=version, stamp_us=stamp_us)
         self._dashboard = DashboardServer(target=dashboard, version=version)
         self._gripper = None if gripper is None else GripperServer(target=gripper)

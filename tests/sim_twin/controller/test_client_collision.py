@@ -71,4 +71,4 @@ def test_a_safety_plane_stops_an_arm_that_the_client_drives_through_it():
         station.rest()
         assert 0.06 < station.pose[2] < 0.101
         told = [line for line in station.process.fault("log")["lines"] if re.match(r"C\d", line)]
-        assert told == ["C152A0: target position is beyond a safety plane"]
+        assert told == ["C152A0: target moves too fast towards a safety plane to stop before it"]

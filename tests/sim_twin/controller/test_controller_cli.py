@@ -42,7 +42,7 @@ def test_a_controller_says_that_it_is_ready_and_ends_cleanly(tmp_path):
     shelved = tmp_path / "b.script"
     shelved.write_text("def g():\n set_digital_out(3, True)\nend\n")
     command = [*RUN, "--host", "127.0.0.10", "--version", "5.23.0", "--script", str(script), "--program", str(shelved)]
-    command += ["--plane", "0,0,1,0.01", "--plane", "-1,0,0,-2"]
+    command += ["--plane", "0,0,1,0.01", "--plane", "-1,0,0,-2", "--safety-input", "safeguard=CI2"]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as running:
         assert running.stdout.readline() == "virtual UR5e 5.23.0 ready on 127.0.0.10\n"
         time.sleep(0.3)
@@ -52,6 +52,8 @@ def test_a_controller_says_that_it_is_ready_and_ends_cleanly(tmp_path):
         ]  # fmt: skip
         time.sleep(0.3)
         assert ask_fault("127.0.0.10", "truth")["digital_out"] == 1 << 2 | 1 << 3
+        assert "refusal" not in ask_fault("127.0.0.10", "terminal", name="safeguard")
+        assert ask_fault("127.0.0.10", "truth")["safety_mode"] == "SAFEGUARD_STOP"
         running.send_signal(signal.SIGINT)
         out, err = running.communicate(timeout=10)
     assert running.returncode == 0, err
@@ -64,6 +66,13 @@ def test_a_plane_that_is_none_is_refused_in_one_line(plane):
     result = CliRunner().invoke(app, ["--host", "127.0.0.10", "--plane", plane])
     assert result.exit_code == 2
     assert result.output.startswith("error: plane: expected")
+    assert result.output.count("\n") == 1
+
+
+def test_a_safety_input_that_is_none_is_refused_in_one_line():
+    result = CliRunner().invoke(app, ["--host", "127.0.0.10", "--safety-input", "door=CI0"])
+    assert result.exit_code == 2
+    assert result.output.startswith("error: safety input: expected")
     assert result.output.count("\n") == 1
 
 

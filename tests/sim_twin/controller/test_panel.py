@@ -5,6 +5,7 @@ import pytest
 
 from sim_twin.controller.faults import Faults
 from sim_twin.controller.ticks import TickTimes
+from sim_twin.controller.wire import ControllerVersion
 from sim_twin.controller.wire.realtime import RealtimeState
 from tests.support.virtual_robot import make_robot, run, started
 
@@ -84,6 +85,14 @@ def test_the_control_mode_tells_of_force_and_freedrive():
 
     assert mode("sync()") == 0
     assert mode("freedrive_mode()") == 1
+    torque = started(
+        "def f():\n while True:\n  direct_torque([0,0,0,0,0,0])\n end\nend\n", version=ControllerVersion(minor=23)
+    )
+    run(torque, 5)
+    assert torque.panel.primary_state().mode.control_mode == 3
+    torque.panel.stop()
+    run(torque, 20)
+    assert torque.panel.primary_state().mode.control_mode == 0
     assert mode("force_mode(p[0,0,0,0,0,0], [0,0,1,0,0,0], [0,0,1,0,0,0], 2, [1,1,1,1,1,1])") == 2
 
 

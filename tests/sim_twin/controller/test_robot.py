@@ -6,8 +6,10 @@ import msgspec
 import numpy as np
 import pytest
 
+from sim_twin.controller.faults import Faults
 from sim_twin.controller.motion.limits import Plane
 from sim_twin.controller.states import Event, RobotMode, RuntimeState, SafetyMode
+from sim_twin.controller.ticks import TickTimes
 from sim_twin.controller.wire import ControllerVersion, Outcome, output_fields
 from tests.support.virtual_robot import FOREVER, ended, lines, make_robot, run, started, state_of
 
@@ -99,6 +101,63 @@ def test_noise_is_seen_by_interfaces_and_not_by_physics():
     off = np.array(robot.outputs["actual_q"]()) - robot.machine.world.data.qpos[:6]
     assert off == pytest.approx(bias)
     assert robot.machine.modes.safety is SafetyMode.NORMAL
+
+
+def test_the_speeds_that_are_read_are_as_noisy_as_the_angles():
+    robot = make_robot()
+    fault = Faults(robot, None, TickTimes()).apply
+    run(robot, 5)
+    fault("noise", rad=1e-3)
+    seen = []
+    for _ in range(1500):
+        robot.step()
+        seen.append((robot.outputs["actual_qd"](), robot.outputs["actual_TCP_speed"](), robot.outputs["actual_q"]()))
+    qd, tcp, q = (np.array(column) for column in zip(*seen, strict=True))
+    measured = robot.machine.drive.measured
+    J = robot.machine.drive.kinematics.jacobian(measured.q_rad, robot.machine.drive.core.T_ft)
+    assert tcp[-1] == pytest.approx(J @ qd[-1], abs=1e-9), "one and the same noise"
+    assert (qd[500:].std(axis=0) > 2e-3).all()
+    assert (qd[500:].std(axis=0) < 8e-3).all()
+    # What is read is moved by the noise alone: speeds, summed up, come back to where they began.
+    assert np.abs(np.cumsum(qd, axis=0) * 0.002).max() < 5e-3
+    assert q.std(axis=0) == pytest.approx(np.full(6, 1e-3), rel=0.15)
+    assert robot.machine.drive.is_standing, "and the arm stands"
+    fault("noise")
+    run(robot, 2)
+    assert np.abs(robot.outputs["actual_qd"]()).max() < 1e-4
+
+
+def test_the_tools_accelerometer_feels_how_the_tool_moves():
+    robot = make_robot()
+    run(robot, 5)
+    kinematics = robot.machine.drive.kinematics
+    assert np.linalg.norm(robot.outputs["actual_tool_accelerometer"]()) == pytest.approx(9.81, abs=0.01)
+    robot.submit_script("def f():\n q = get_actual_joint_positions()\n q[0] = q[0] - 1.5\n movej(q, a=6, v=3)\nend\n")
+    greatest, seen = 0.0, []
+    for _ in range(150):
+        robot.step()
+        q = robot.machine.world.data.qpos[:6].copy()
+        T_bf = kinematics.forward(q)
+        seen.append(T_bf[:3, 3])
+        felt = T_bf[:3, :3] @ robot.outputs["actual_tool_accelerometer"]() - [0.0, 0.0, 9.81]
+        if len(seen) >= 3:
+            expected = (seen[-1] - 2.0 * seen[-2] + seen[-3]) / 0.002**2
+            assert felt == pytest.approx(expected, abs=0.35)
+            greatest = max(greatest, float(np.linalg.norm(felt)))
+    assert greatest > 2.0
+    assert robot.panel.realtime_state().tool_acceleration_m_s2 == robot.outputs["actual_tool_accelerometer"]()
+
+
+def test_the_deviation_ratio_tells_how_near_a_stop_is_and_every_e_series_has_it():
+    robot = make_robot()
+    run(robot, 50)
+    ratio = robot.outputs["joint_position_deviation_ratio"]
+    assert ratio() < 0.01
+    robot.machine.world.data.qfrc_applied[0] = 60.0
+    run(robot, 100)
+    assert 0.02 < ratio() < 1.0
+    assert "joint_position_deviation_ratio" in output_fields(ControllerVersion())
+    assert "control_step" not in output_fields(ControllerVersion(minor=25))
 
 
 PRESS = """def f():

@@ -3,11 +3,14 @@
 import sys
 
 import pytest
+from typer.testing import CliRunner
 
 from sim_twin.controller import server as module
+from sim_twin.controller.cli import app
 from sim_twin.controller.pacing import Pacer
 from sim_twin.controller.server import ControllerServer, Setup, parse_version
 from sim_twin.controller.states import SafetyMode
+from sim_twin.controller.wire.rtde_codec import Level
 from tests.support.virtual_robot import lines, run
 
 
@@ -54,8 +57,38 @@ def test_a_plane_of_the_set_up_stops_the_tool_that_is_driven_through_it():
     assert robot.machine.drive.is_standing
     assert 0.06 < robot.machine.drive.measured.tcp_pose[2] < 0.101
     assert [line for line in lines(robot) if line.startswith("C")] == [
-        "C152A0: target position is beyond a safety plane"
+        "C152A0: target moves too fast towards a safety plane to stop before it"
     ]
+    server.close()
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("def f():\n sync()\n movej([0,0)\nend\n", ("line 3", "movej([0,0)")),
+        ("def f():\n sync()\n nonsense()\nend\n", ("line 3", "nonsense()")),
+        ("def f():\n" + "x = (" * 3000 + "\nend\n", ("script:",)),
+    ],
+)
+def test_a_script_that_is_none_is_told_with_its_line_and_ends_the_command(tmp_path, text, words):
+    file = tmp_path / "bad.script"
+    file.write_text(text)
+    with pytest.raises(ValueError, match="script"):
+        ControllerServer(Setup(script=text))
+    result = CliRunner().invoke(app, ["--host", "127.0.0.10", "--script", str(file)])
+    assert result.exit_code == 2
+    assert result.output.startswith("error: script: ")
+    assert result.output.count("\n") == 1
+    assert all(word in result.output for word in words)
+
+
+def test_rtdes_clients_hear_errors_in_words(monkeypatch):
+    server, said = ControllerServer(Setup()), []
+    monkeypatch.setattr(server.wires.rtde, "say", lambda message, **how: said.append((message, how["level"])))
+    server.robot.machine.journal.error(153, 2, "position deviates")
+    server.tick()
+    server.tick()
+    assert said == [("C153A2: position deviates", Level.ERROR)]
     server.close()
 
 

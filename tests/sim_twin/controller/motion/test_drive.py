@@ -301,6 +301,20 @@ def test_weight_shows_in_the_currents():
     assert drive.measured.current_a[1] == pytest.approx(drive.measured.torque_nm[1] / 13.6)
 
 
+def test_no_current_flows_where_the_brakes_hold():
+    drive = make_drive()
+    idle(drive, 5)
+    for is_cut in (True, False):
+        drive.stop(is_cut=is_cut)
+        drive.lock()
+        idle(drive, 5)
+        assert (drive.measured.torque_nm == 0.0).all()
+        assert (drive.measured.current_a == 0.0).all()
+    drive.engage()
+    idle(drive, 5)
+    assert abs(drive.measured.torque_nm[1]) > 10.0
+
+
 def step(drive, modes, motion):
     """One slice of a controller: the program, the drive, the modes. Returns whether the program goes on."""
     is_alive = motion is not None

@@ -14,6 +14,7 @@ from sim_twin.controller.motion.limits import (
     breach_asked,
     breach_felt,
     default_limits,
+    is_outside,
 )
 
 TWO_PI, PI = 2 * np.pi, resolve().arm.joints[0].speed_rad_s
@@ -42,6 +43,7 @@ def asked(**changes):
 def felt(**changes):
     still = {
         "q_rad": np.zeros(6), "qd_rad_s": np.zeros(6), "q_expected_rad": np.zeros(6), "tool_m": np.array([0, 0, 0.3]),
+        "tool_velocity_m_s": np.zeros(3), "pressed_s": 0.0,
         "tool_speed_m_s": 0.0, "force_n": 0.0, "external_nm": np.zeros(6),
     }  # fmt: skip
     return Felt(**still | changes)
@@ -79,7 +81,6 @@ def test_what_is_asked_may_be_at_the_limit_and_not_beyond(joint, sign, field, li
 @pytest.mark.parametrize(
     ("field", "limits", "cause", "is_violation"),
     [
-        ("q_rad", [TWO_PI + np.radians(5)] * 6, Cause.JOINT_VIOLATION, True),
         ("qd_rad_s", [PI + np.radians(1.15)] * 6, Cause.JOINT_SPEED, False),
         ("qd_rad_s", [PI + np.radians(11)] * 6, Cause.JOINT_SPEED_VIOLATION, True),
         ("external_nm", LIMITS.collision_nm, Cause.JOINT_COLLISION, False),
@@ -100,7 +101,6 @@ def test_what_is_felt_may_be_just_below_the_limit_and_not_just_above(joint, fiel
         ("tool_speed_m_s", 1.55, Cause.TOOL_SPEED),
         ("tool_speed_m_s", 1.65, Cause.TOOL_SPEED_VIOLATION),
         ("force_n", 250.0, Cause.TOOL_COLLISION),
-        ("force_n", 275.0, Cause.FORCE_VIOLATION),
     ],
 )
 def test_speed_and_force_of_the_tool(field, limit, cause):
@@ -128,8 +128,56 @@ def test_a_plane_stops_what_is_asked_and_four_centimetres_on_what_is_felt():
     assert breach_asked(LIMITS, asked(tool_m=z(0.1 - 1e-9), tool_before_m=above)).cause is Cause.PLANE
     assert breach_asked(LIMITS, asked(tool_m=z(0.09), tool_before_m=z(0.09))) is None, "standing beyond it"
     assert breach_asked(LIMITS, asked(tool_m=z(0.09), tool_before_m=z(0.088))) is None, "coming back"
-    assert breach_felt(LIMITS, felt(tool_m=z(0.0600001))) is None
-    assert breach_felt(LIMITS, felt(tool_m=z(0.0599999))).cause is Cause.PLANE_VIOLATION
+    further = np.array([0.3, 0.0, -after(0.005)])
+    assert breach_felt(LIMITS, felt(tool_m=z(0.0600001), tool_velocity_m_s=further)) is None
+    assert breach_felt(LIMITS, felt(tool_m=z(0.0599999), tool_velocity_m_s=further)).cause is Cause.PLANE_VIOLATION
+    for velocity in (np.zeros(3), np.array([1.0, 0.0, -0.005]), np.array([0.0, 0.0, 0.5])):
+        assert breach_felt(LIMITS, felt(tool_m=z(-1.0), tool_velocity_m_s=velocity)) is None, "standing, or coming back"
+    nowhere = z(np.nan)
+    assert breach_felt(LIMITS, felt(tool_m=nowhere, tool_velocity_m_s=nowhere)).cause is Cause.PLANE_VIOLATION
+
+
+def test_a_plane_stops_what_could_not_stop_before_it():
+    def z(value):
+        return np.array([0.3, 0, value])
+
+    going = {"tool_m": z(0.3), "tool_before_m": z(0.301)}
+    assert breach_asked(LIMITS, asked(**going, tool_stop_m=(z(0.2), z(0.1)))) is None
+    for places in ((z(0.2), z(0.1 - 1e-9)), (z(0.1 - 1e-9), z(0.2)), (z(0.2), z(np.nan))):
+        assert breach_asked(LIMITS, asked(**going, tool_stop_m=places)).cause is Cause.PLANE
+    back = {"tool_m": z(0.05), "tool_before_m": z(0.049)}
+    assert breach_asked(LIMITS, asked(**back, tool_stop_m=(z(0.06), z(0.07)))) is None, "on the way back"
+
+
+@pytest.mark.parametrize("joint", range(6))
+@pytest.mark.parametrize("sign", [-1, 1])
+def test_a_joint_beyond_its_limit_is_a_violation_only_where_it_goes_further(joint, sign):
+    edge, further = TWO_PI + np.radians(5), at(joint, sign * after(0.01))
+    beyond, within = at(joint, sign * (edge + 1e-9)), at(joint, sign * (edge - 1e-9))
+    assert breach_felt(LIMITS, felt(q_rad=within, qd_rad_s=further, q_expected_rad=within)) is None
+    breach = breach_felt(LIMITS, felt(q_rad=beyond, qd_rad_s=further, q_expected_rad=beyond))
+    assert breach is not None
+    assert (breach.cause, breach.joint) == (Cause.JOINT_VIOLATION, joint)
+    for speed in (0.0, sign * 0.01, -sign * 1.0):
+        assert breach_felt(LIMITS, felt(q_rad=beyond, qd_rad_s=at(joint, speed), q_expected_rad=beyond)) is None
+    assert [is_outside(LIMITS, q, TOOL) for q in (within, beyond)] == [False, True]
+
+
+def test_who_stands_beyond_a_plane_and_its_tolerance_is_outside():
+    places = [np.array([0.3, 0, z]) for z in (0.0600001, 0.0599999, np.nan)]
+    assert [is_outside(LIMITS, np.zeros(6), tool_m) for tool_m in places] == [False, True, True]
+
+
+def test_only_a_force_that_lasts_is_a_violation():
+    for force_n, pressed_s, cause in (
+        (after(275.0), 0.5, Cause.FORCE_VIOLATION),
+        (after(275.0), np.nextafter(0.5, 0.0), Cause.TOOL_COLLISION),
+        (1e6, 0.0, Cause.TOOL_COLLISION),
+        (275.0, 9.0, Cause.TOOL_COLLISION),
+    ):
+        breach = breach_felt(LIMITS, felt(force_n=force_n, pressed_s=pressed_s))
+        assert breach is not None
+        assert breach.cause is cause
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])

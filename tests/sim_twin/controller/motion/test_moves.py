@@ -408,3 +408,13 @@ def test_a_blend_under_a_lowered_slider_goes_the_same_way_slower(low):
     off = [np.linalg.norm(ways[1] - p, axis=1).min() for p in ways[0][::10]]
     assert max(off) < 1e-3
     assert len(ways[1]) == pytest.approx(len(ways[0]) / low, rel=0.05)
+
+
+@pytest.mark.parametrize("move", ["movel", "movep", "servoc", "movec"])
+def test_a_tool_move_to_where_no_arm_reaches_says_so(move):
+    bench = make_bench()
+    moves, there = bench.motions.moves, (3.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    points = ((0.4, 0.3, 0.4, 0.0, 0.0, 0.0), there) if move == "movec" else (there,)
+    with pytest.raises(KinematicsError, match="no joint angles bring the tool to") as told:
+        next(getattr(moves, move)(*points))
+    assert "seed" not in str(told.value)

@@ -11,6 +11,7 @@ class Bench:
 
     def __init__(self, version):
         self.robot = Robot(version)
+        self.heard = []
         self.wires = Wires(
             outputs=self.robot.outputs,
             inputs=self.robot,
@@ -20,6 +21,7 @@ class Bench:
             gripper=self.robot,
             version=version,
             stamp_us=lambda: 42,
+            hear=self.heard.append,
         )
         self.wires.open(HOST, is_free=True)
         self.clients = []

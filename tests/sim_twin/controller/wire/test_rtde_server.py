@@ -249,13 +249,34 @@ def test_data_that_fits_no_recipe_writes_nothing_and_is_told(bench, payload):
     assert bench.robot.written == [("input_int_register_0", 0)]
 
 
-def test_text_messages_reach_every_client_in_its_protocol(bench):
-    old, new = bench.rtde(1), bench.rtde(2)
+def test_text_messages_reach_every_started_client_in_its_protocol(bench):
+    old, new, idle = bench.rtde(1), bench.rtde(2), bench.rtde(2)
+    old.rtde("O", b"timestamp")
+    new.outputs("timestamp")
+    assert [client.rtde("S") for client in (old, new)] == [b"\x01", b"\x01"]
     bench.wires.rtde.say("stop", level=Level.WARNING, source="safety")
     assert new.frame() == ("M", b"\x04stop\x06safety\x02")
     assert old.frame() == ("M", b"\x02stop")
+    assert idle.silent(), "it would take it for the answer to what it asks next"
+
+
+def test_what_clients_say_is_heard_with_its_source_and_level(bench):
+    old, new = bench.rtde(1), bench.rtde(2)
     new.say("M", b"\x02hi\x02me\x03")
+    new.until(lambda: len(bench.heard) == 1)
+    old.say("M", b"\x02hello")
+    old.until(lambda: len(bench.heard) == 2)
+    assert bench.heard == ["RTDE client me, level 3: hi", "RTDE client without a name, level 2: hello"]
     assert new.silent()
+
+
+@pytest.mark.parametrize("payload", [b"", b"\x05hi", b"\x02hi\x02me", b"\x02hi"])
+def test_a_text_that_is_shorter_than_it_says_ends_that_client_only(bench, payload):
+    rough, other = bench.rtde(), bench.rtde()
+    rough.say("M", payload)
+    assert rough.ended()
+    assert len(other.rtde("v")) == 16
+    assert bench.heard == []
 
 
 def test_an_unknown_message_is_told_and_the_client_stays(bench):

@@ -1,0 +1,35 @@
+"""What the arm measures after each slice."""
+
+import msgspec
+
+from sim_twin.controller.motion.poses import Array
+from sim_twin.controller.motion.wrench import cross
+
+__all__ = ["Measured", "flange_velocity"]
+
+
+class Measured(msgspec.Struct, frozen=True, kw_only=True):
+    """What the arm measured after a slice. Arrays of their own; base axes, SI units."""
+
+    q_rad: Array
+    qd_rad_s: Array
+    tcp_pose: Array
+    """UR pose of the tool that the program set."""
+    tcp_speed: Array
+    """(v, w) of it."""
+    acceleration: Array
+    """Of the flange, without gravity; an accelerometer's, which no encoder's noise touches."""
+    wrench: Array
+    """Force and torque of the world on the tool, at the tool; payload as told taken off, zeroed."""
+    torque_nm: Array
+    """Of the joints, weight included."""
+    current_a: Array
+    """Torque over a constant of each joint."""
+    external_nm: Array
+    """Torque on the joints from contacts."""
+
+
+def flange_velocity(T_bt: Array, twist: Array, T_ft: Array) -> Array:
+    """Return the velocity of the flange that a tool's (v, w) means, base axes.  (4, 4), (6,), (4, 4) -> (3,)"""
+    to_flange = -T_bt[:3, :3] @ (T_ft[:3, :3].T @ T_ft[:3, 3])
+    return twist[:3] + cross(twist[3:], to_flange)
