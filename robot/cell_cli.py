@@ -19,6 +19,7 @@ from robot.cell_check import Finding, Somebody, Wire, check_cell_wires
 from robot.errors import RobotConfigError
 from robot.hal.pins import straight_cell
 from robot.hal.ur_checks import check_serial
+from robot.hal.ur_state import kind_of_address
 from robot.rigs import check_usable
 
 __all__ = ["app"]
@@ -64,6 +65,12 @@ def _walk(resolved: Resolved, *, is_auto: bool) -> list[Finding]:
     check_usable(rig)
     if rig.address is None:
         raise RobotConfigError(f"rig {rig.name}: expected an arm with a control box at an address, it has none")
+    kind = kind_of_address(rig.address).value
+    if kind != rig.expected.kind:
+        raise RobotConfigError(
+            f"rig {rig.name}: expected.kind is {rig.expected.kind}, at {rig.address} there can only be a {kind} arm: "
+            "on this machine's loopback there are virtual controllers, anywhere else real ones"
+        )
     with ExitStack() as stack:
         somebody = stack.enter_context(_truth_of(rig)) if is_auto else _Person()
         terminals = stack.enter_context(UrTerminals(rig.address))

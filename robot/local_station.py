@@ -1,6 +1,7 @@
 """A station: perception and the hand's reflexes around a loop that holds the arm, and the arming of it all."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Generator
+from contextlib import contextmanager
 from time import monotonic_ns
 from types import TracebackType
 
@@ -10,7 +11,7 @@ from config.arm import ArmConfig
 from config.rig import Rig
 from config.scenario import Scenario
 from robot.as_came import as_came
-from robot.errors import RobotConfigError, SafetyError, WireError
+from robot.errors import RobotConfigError, RobotError, SafetyError, WireError
 from robot.messages import (
     ArmState,
     Executed,
@@ -231,12 +232,17 @@ class LocalStation:
         self._arming.arm(identity=self._world.identity, by=by, grant=self._tenure.renewed(), answer=answer)
 
     def engage(self) -> None:
-        """Go from armed to engaged: everything starts from the measured state. For an operator."""
+        """Go from armed to engaged: everything starts from the measured state. For an operator.
+
+        Raises:
+            RobotError: command was not taken, or was lost meanwhile; it is latched for that.
+        """
         self._arming.require_armed()
-        self._loop.engage()
-        self._tenure.renewed()
-        self._arming.engage()
-        self._seed()
+        with self._latched_by_failure():
+            self._loop.engage()
+            self._tenure.renewed()
+            self._arming.engage()
+            self._seed()
 
     def reset_plant(self, *, seed: int, epoch: int) -> None:
         """Lay the table out in any mode. Clears no latch. For an operator."""
@@ -253,13 +259,16 @@ class LocalStation:
 
         Raises:
             NotEngagedError: the station is not engaged; a latch is never cleared here.
+            RobotError: the table was not laid out, or command was lost meanwhile; it is latched for that.
         """
         self._require_command()
-        self.reset_plant(seed=seed, epoch=epoch)
+        with self._latched_by_failure():
+            self.reset_plant(seed=seed, epoch=epoch)
         self._tenure.renewed()  # the source waited for it
         self._require_command()
-        self._loop.engage()  # a plant that stopped its arm for the reset took command away
-        return self._seed()
+        with self._latched_by_failure():
+            self._loop.engage()  # a plant that stopped its arm for the reset took command away
+            return self._seed()
 
     def step(self, intent: Intent, *, duration_s: float | None = None) -> StepResult:
         """Carry out an intent for one time step and return the percept after it.
@@ -297,15 +306,22 @@ class LocalStation:
         _ = self.state
         self._arming.require_engaged()
 
-    def _seed(self) -> Percept:
-        """Start everything from the measured state. Where nothing is known of arm or table, stop and latch."""
+    @contextmanager
+    def _latched_by_failure(self) -> Generator[None]:
+        """Stop and latch where taking command, or laying the table out, fails: nobody knows who holds the arm then."""
         try:
-            state = self._loop.seed()
-            percept = self._perceive(state)
-        except WireError as error:
-            self._loop.stop()
-            self._arming.latch(f"{Reason.STALE_STATE.value}: {error}")
+            yield
+        except RobotConfigError:
             raise
+        except RobotError as error:
+            self._loop.stop()
+            self._arming.latch(str(error))
+            raise
+
+    def _seed(self) -> Percept:
+        """Start everything from the measured state."""
+        state = self._loop.seed()
+        percept = self._perceive(state)
         self._reflexes.reset(percept)
         return percept
 

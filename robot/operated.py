@@ -1,18 +1,33 @@
-"""A station with its operator: armed once at the start, armed again at the reset after a latch."""
+"""A station with its operator: armed once at the start, armed again at the reset after a latch.
 
+An arm may stop at any moment, also while its table is laid out and command is taken for the next epoch. That is a latch
+like any other: the operator arms again, as often as the latch limit allows, and the reset is done once more. A wire
+that fails while the station is latched counts as no latch; it is tried five times.
+"""
+
+from collections.abc import Callable
+from time import sleep
 from types import TracebackType
 from typing import Protocol
 
-from robot.errors import NotEngagedError, WireError
+from robot.errors import RobotConfigError, RobotError, WireError
 from robot.messages import Intent, Percept, StationMode, StationSpec, StationState, StepResult
-from robot.safety import Armable, Operator
+from robot.safety import Armable, Operator, TooManyLatchesError
 from robot.station import Station
 
 __all__ = ["OperatedStation"]
 
+MOST_FAILED, PAUSE_S = 5, 1.0
+"""So often in a row a wire may fail while nothing is engaged that could latch; so long is waited before each try."""
+
 
 class _ArmableStation(Station, Armable, Protocol):
     """A station that an operator can arm."""
+
+    @property
+    def n_latches(self) -> int:
+        """How often it has latched."""
+        ...
 
 
 class OperatedStation:
@@ -22,16 +37,20 @@ class OperatedStation:
         n_resets: How often the table was laid out for an epoch.
     """
 
-    def __init__(self, station: _ArmableStation, operator: Operator | None) -> None:
-        """Store both.
+    def __init__(
+        self, station: _ArmableStation, operator: Operator | None, *, pause: Callable[[float], object] = sleep
+    ) -> None:
+        """Store.
 
         Args:
             station: what to operate.
             operator: who arms it; None where a person must, before and during the run.
+            pause: waits for so many seconds.
         """
         self._station = station
         self._operator = operator
         self.n_resets = 0
+        self._pause = pause
 
     def connect(self) -> None:
         """Arm the station, if there is an operator and it is not armed yet."""
@@ -51,24 +70,37 @@ class OperatedStation:
     def reset(self, *, seed: int, epoch: int) -> Percept:
         """Lay the table out for an epoch; after a latch the operator first resets the plant and arms again.
 
-        So too where the arm is lost while the table is laid out: that is no other loss than one in an epoch.
+        Where the arm is lost on the way, or a wire fails, it is done once more.
 
         Raises:
             NotEngagedError: nobody has armed the station, or it is latched and there is no operator.
             WireError: the plant cannot be laid out.
             TooManyLatchesError: it has latched more often than it may.
+            RobotError: the operator refuses, or a wire failed five times in a row while nothing was engaged.
         """
+        n_failed = 0
         while True:
+            n_latches = self._station.n_latches
             try:
-                if self._operator is not None and self._station.state.mode is StationMode.LATCHED:
-                    self._operator.rearm(self._station, seed=seed, epoch=epoch)
-                percept = self._station.reset(seed=seed, epoch=epoch)
-            except (NotEngagedError, WireError):
-                if self._operator is None or self._station.state.mode is not StationMode.LATCHED:
+                percept = self._reset(seed=seed, epoch=epoch)
+            except (RobotConfigError, TooManyLatchesError):
+                raise
+            except RobotError as error:
+                is_latched = self._station.state.mode is StationMode.LATCHED
+                is_new = self._station.n_latches > n_latches
+                n_failed = 0 if is_new else n_failed + 1
+                is_borne = is_new or (isinstance(error, WireError) and n_failed < MOST_FAILED)
+                if self._operator is None or not is_latched or not is_borne:
                     raise
             else:
                 self.n_resets += 1
                 return percept
+            self._pause(PAUSE_S)
+
+    def _reset(self, *, seed: int, epoch: int) -> Percept:
+        if self._operator is not None and self._station.state.mode is StationMode.LATCHED:
+            self._operator.rearm(self._station, seed=seed, epoch=epoch)
+        return self._station.reset(seed=seed, epoch=epoch)
 
     def step(self, intent: Intent, *, duration_s: float | None = None) -> StepResult:
         """Carry out an intent for one time step."""

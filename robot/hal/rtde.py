@@ -52,7 +52,11 @@ FIELDS = (
 )  # fmt: skip
 """All that is read here. Left to itself the client asks for 58 and more, which the controller would pack, and a thread
 beside the servo loop unpack, 500 times a second."""
-STALE_NS, HAND_NS = 50_000_000, 40_000_000
+STALE_NS = 40_000_000
+"""A state that stands still so long is lost. It is to be noticed within 50 ms: on top of this come the tick of 2 ms
+that looks, the one in which the controller last sent, and what a busy machine adds to either."""
+PAUSE_NS, HAND_NS = 50_000_000, 40_000_000
+"""After such a pause what the hand said last is of before; and so long its next word is waited for."""
 WRITE_NS = 35_000_000
 """A command that took longer was no mere sending: the client may have reconnected in it, which takes 40 ms at least."""
 STOP_RAD_S2, REST_S, STILL_RAD_S = 10.0, 1.0, 0.01
@@ -170,7 +174,7 @@ class RtdeArm:
         """Return the newest state.
 
         Raises:
-            StaleStateError: not connected, the link was cut, or the controller's own time has stood still for 50 ms.
+            StaleStateError: not connected, the link was cut, or the controller's own time has stood still for 40 ms.
             ArmRefusedError: the hand does not answer because the arm is stopped: where drives are cut it has no power.
             WireError: the hand does not answer.
         """
@@ -325,7 +329,7 @@ class RtdeArm:
     def _grip_now(self) -> GripState:
         """Return what the hand says; after a pause wait for what it says now, the next answer being of before."""
         now_ns, hand = monotonic_ns(), self._gripper
-        is_late, self._polled_ns = now_ns - self._polled_ns > STALE_NS, now_ns
+        is_late, self._polled_ns = now_ns - self._polled_ns > PAUSE_NS, now_ns
         is_asked, self._is_hand_asked = self._is_hand_asked, False
         if is_late:
             fresh, deadline_ns = hand.n_answers + 2, now_ns + HAND_NS

@@ -31,7 +31,7 @@ REPEATED = pytest.StashKey[list[str]]()
 def pytest_runtest_protocol(item, nextitem):
     """Repeat what failed in wall time while the machine had too few processors; elsewhere a failure is one.
 
-    An arm counts as lost after 50 ms without a state, and a program as silent after 100 ms without a command: where the
+    An arm counts as lost after 40 ms without a state, and a program as silent after 100 ms without a command: where the
     machine's load alone makes such gaps, a failure says nothing of the plant. How long it was is the kernel's count.
     """
     name = getattr(getattr(item, "callspec", None), "params", {}).get("world")

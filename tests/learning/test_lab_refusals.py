@@ -20,10 +20,19 @@ def no_wires(monkeypatch):
     monkeypatch.setattr(socket.socket, "connect", refuse)
 
 
+N_TOLD = 3
+"""Lines on what a run with a person at the arm would take."""
+
+
 def said(*arguments):
     done = CliRunner().invoke(app, [str(argument) for argument in arguments])
-    assert done.stderr.count("\n") == 1, done.output
-    return done.exit_code, done.stderr
+    *told, error = done.stderr.splitlines()
+    assert error.startswith("error: "), done.output
+    assert len(told) == (N_TOLD if arguments[0] == "learn" else 0), done.output
+    if told:
+        assert "robot-hours: at most" in told[1]
+        assert "resets by a person" in told[2]
+    return done.exit_code, error
 
 
 def filled(tmp_path, **changes):
@@ -63,3 +72,15 @@ def test_a_truth_is_not_taken_for_a_real_tables_perception_nor_its_buttons_press
     code, text = said("cell", "test", "--rig", filled(tmp_path), "--auto")
     assert code == 2
     assert "--auto is for a virtual controller" in text
+
+
+@pytest.mark.parametrize(
+    ("kind", "address", "other"), [("real", "127.0.0.120", "virtual"), ("virtual", "192.0.2.20", "real")]
+)
+def test_a_cell_is_not_walked_through_where_another_kind_of_arm_must_be(tmp_path, monkeypatch, kind, address, other):
+    monkeypatch.chdir(tmp_path)
+    expected = shipped_tree("rigs", "lab")["expected"] | {"kind": kind, "serial": "20235500001"}
+    tree = shipped_tree("rigs", "lab") | {"address": address, "expected": expected}
+    code, text = said("cell", "test", "--rig", write(tmp_path, "my_lab.yaml", tree))
+    assert code == 2
+    assert f"expected.kind is {kind}, at {address} there can only be a {other} arm" in text

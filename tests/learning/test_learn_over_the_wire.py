@@ -160,6 +160,27 @@ def test_a_run_outlives_a_protective_stop_as_the_virtual_tables_reset_unlocks_it
     assert_at_rest(controller)
 
 
+@pytest.mark.slow
+def test_a_run_outlives_programs_that_are_stopped_at_any_moment_of_an_epoch_or_a_reset(lab):
+    folder, controller = lab
+    n_stops = 0
+    with start(folder, *learn("interrupted")) as process:
+        try:
+            until(lambda: process.poll() is not None or epochs_of(folder / "interrupted"), timeout_s=90)
+            while process.poll() is None and n_stops < 12:
+                if controller.fault("truth")["runtime"] == "PLAYING":
+                    controller.fault("program_stop")
+                    n_stops += 1
+                time.sleep(0.23)
+            _, said = process.communicate(timeout=120)
+        finally:
+            process.kill()
+    assert process.returncode == 0, said
+    assert n_stops > 1
+    assert epochs_of(folder / "interrupted") == [0, 1, 2]
+    assert_at_rest(controller)
+
+
 def test_workers_are_refused_where_there_is_one_arm(lab):
     code, _, said = autotelic(lab[0], *learn("workers", "--workers", "1"))
     assert (code, said.count("\n")) == (2, 1)

@@ -1,14 +1,23 @@
 """Who arms a station in an unattended run, and how the world's own time is told."""
 
+import msgspec
 import pytest
 
 from config.loader import resolve
-from robot.errors import NotEngagedError
+from robot.errors import (
+    ArmRefusedError,
+    NotEngagedError,
+    RobotConfigError,
+    SafetyError,
+    StaleStateError,
+    WireError,
+)
 from robot.messages import Heading, Hold, StationMode
-from robot.operated import OperatedStation
+from robot.operated import MOST_FAILED, OperatedStation
 from robot.rigs import build_operator, build_plant, build_station
 from robot.safety import TooManyLatchesError
 from robot.timed import time_world
+from sim_twin.operator import SimulatedOperator
 
 NAN = Heading(heading_rad=float("nan"), distance_m=0.0, height_m=0.2)
 
@@ -117,3 +126,157 @@ def test_every_tick_is_told_as_stack_then_physics(resolved):
         assert laps == ["stack", "physics"] * 5
         result = station.step(Hold())
         assert plant.arm.clock.now_ns() == result.percept.stamp_ns
+
+
+class Lossy:
+    """A loop that loses its arm at moments that it is told, each once, and otherwise does what the one in it does."""
+
+    def __init__(self, loop):
+        self._loop, self.why_lost = loop, None
+        self.failures, self.n_stops = {}, 0
+
+    def __getattr__(self, name):
+        return getattr(self._loop, name)
+
+    def _fail_at(self, moment):
+        errors = self.failures.get(moment, [])
+        if errors:
+            raise errors.pop(0)
+
+    def engage(self):
+        self._fail_at("engage")
+        self.why_lost = None
+        self._loop.engage()
+
+    def seed(self):
+        self._fail_at("seed")
+        return self._loop.seed()
+
+    def begin_epoch(self, epoch):
+        self._fail_at("begin_epoch")
+        return self._loop.begin_epoch(epoch)
+
+    def stop(self):
+        self.n_stops += 1
+        self._loop.stop()
+
+
+class LosesAt:
+    """Lays the table out, and the arm is lost meanwhile."""
+
+    def __init__(self, resetter, loop):
+        self._resetter, self._loop, self.n_losses, self.n = resetter, loop, 0, 0
+
+    def reset(self, **layout):
+        self.n += 1
+        self._resetter.reset(**layout)
+        if self.n_losses > 0:
+            self.n_losses -= 1
+            self._loop.why_lost = "arm_refused: the program was stopped"
+
+
+class Lossful:
+    """An operated station whose arm may be lost."""
+
+    def __init__(self, resolved, operator):
+        self.plant = build_plant(rig=resolved.rig, arm=resolved.arm, scenario=resolved.scenario)
+        self.local = build_station(resolved, plant=self.plant)
+        self.loop = self.local._loop = Lossy(self.local._loop)
+        self.resetter = self.plant.resetter = LosesAt(self.plant.resetter, self.loop)
+        self.pauses_s = []
+        self.station = OperatedStation(self.local, operator, pause=self.pauses_s.append)
+
+
+@pytest.fixture
+def lossy(resolved):
+    made = Lossful(resolved, build_operator(resolved.rig))
+    with made.station:
+        made.station.reset(seed=1, epoch=0)
+        made.resetter.n = 0
+        yield made
+
+
+def assert_goes_on(lossy, *, n_latches):
+    assert lossy.station.state.mode is StationMode.ENGAGED
+    assert not lossy.station.step(Hold()).is_void
+    assert lossy.local.n_latches == n_latches
+
+
+@pytest.mark.parametrize("n", [1, 3])
+def test_an_arm_that_stops_while_the_table_is_laid_out_is_armed_again_and_the_run_goes_on(lossy, n):
+    lossy.resetter.n_losses = 2 * n - 1  # whoever arms again lays the table out as well, with no arm to lose
+    lossy.station.reset(seed=2, epoch=1)
+    assert_goes_on(lossy, n_latches=n)
+    assert len(lossy.pauses_s) == n
+
+
+FAILURES = [
+    NotEngagedError("expected an engaged arm; engage and seed it first"),
+    SafetyError("expected an engaged arm; engage and seed it first"),
+    ArmRefusedError("the program that obeys has ended"),
+    StaleStateError("no state"),
+    WireError("nobody answers"),
+]
+
+
+@pytest.mark.parametrize("moment", ["begin_epoch", "engage", "seed"])
+@pytest.mark.parametrize("error", FAILURES, ids=lambda e: type(e).__name__)
+def test_a_reset_that_fails_for_a_lost_arm_is_a_latch_and_is_done_once_more(lossy, moment, error):
+    lossy.loop.failures[moment] = [error]
+    n_stops = lossy.loop.n_stops
+    lossy.station.reset(seed=2, epoch=1)
+    assert lossy.loop.n_stops > n_stops
+    assert_goes_on(lossy, n_latches=1)
+
+
+@pytest.mark.parametrize("moment", ["engage", "seed"])
+def test_an_arm_that_is_lost_again_while_it_is_armed_again_is_armed_once_more(lossy, moment):
+    lossy.loop.failures[moment] = [StaleStateError("no state")] * 8
+    lossy.station.reset(seed=2, epoch=1)
+    assert_goes_on(lossy, n_latches=8)
+
+
+def test_a_wire_that_fails_while_latched_is_tried_again_and_its_error_ends_the_run_at_last(lossy):
+    lossy.station.step(NAN)
+    lossy.loop.failures["begin_epoch"] = [WireError("nobody answers")] * (MOST_FAILED - 1)
+    lossy.station.reset(seed=2, epoch=1)
+    assert_goes_on(lossy, n_latches=1)
+    lossy.loop.failures["begin_epoch"] = [WireError("nobody answers")] * (1 + MOST_FAILED)  # the first latches
+    with pytest.raises(WireError, match="nobody answers"):
+        lossy.station.reset(seed=3, epoch=2)
+    assert lossy.station.state.mode is StationMode.LATCHED
+
+
+def test_stops_at_the_wrong_moment_count_as_latches_and_too_many_fail_the_run(resolved):
+    rig = msgspec.structs.replace(resolved.rig, max_latches=2)
+    lossy = Lossful(msgspec.structs.replace(resolved, rig=rig), build_operator(rig))
+    with lossy.station as station:
+        lossy.resetter.n_losses = 5
+        with pytest.raises(TooManyLatchesError, match="at most 2 latches"):
+            station.reset(seed=1, epoch=0)
+
+
+def test_what_is_wrong_with_a_file_or_refused_by_the_operator_is_tried_once(lossy):
+    lossy.loop.failures["engage"] = [RobotConfigError("another arm")]
+    with pytest.raises(RobotConfigError):
+        lossy.station.reset(seed=2, epoch=1)
+    lossy.station.step(NAN)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(SimulatedOperator, "rearm", refuse)
+        with pytest.raises(SafetyError, match="nobody is there"):
+            lossy.station.reset(seed=2, epoch=1)
+    assert lossy.pauses_s == []
+
+
+def refuse(*_args, **_layout):
+    raise SafetyError("nobody is there")
+
+
+def test_without_an_operator_a_stop_at_the_wrong_moment_waits_for_a_person(resolved):
+    lossy = Lossful(resolved, None)
+    SimulatedOperator().arm_once(lossy.local)
+    lossy.resetter.n_losses = 1
+    with pytest.raises(NotEngagedError, match="the program was stopped"):
+        lossy.station.reset(seed=1, epoch=0)
+    assert lossy.station.state.mode is StationMode.LATCHED
+    lossy.station.close()

@@ -17,7 +17,9 @@ from tests.support.loopback import own_address
 pytestmark = pytest.mark.realtime
 
 pytest.importorskip("rtde_control", reason="the genuine client comes with `pip install autotelic[lab]`")
+rtde = pytest.importorskip("robot.hal.rtde")
 
+STALE_NS = rtde.STALE_NS
 CONFIG = load_arm("ur5e")
 DASHBOARD, RTDE = 29999, 30004
 
@@ -221,3 +223,31 @@ def test_an_arm_that_somebody_slows_down_in_command_is_refused(controller, arm, 
             arm.engage()
     finally:
         controller.fault(fault, **off)
+
+
+TICK_NS = 2_000_000
+
+
+class Still:
+    """A client that serves the last state for ever, as ur_rtde's does after a drop."""
+
+    def getTimestamp(self):  # noqa: N802 - ur_rtde's name
+        return 12.5
+
+
+@pytest.mark.parametrize(("age_ns", "is_stale"), [(0, False), (STALE_NS, False), (STALE_NS + 1, True)])
+def test_a_state_that_stands_still_is_borne_up_to_the_limit_and_not_beyond(monkeypatch, age_ns, is_stale):
+    made, now_ns = rtde.RtdeArm(arm=CONFIG, address="127.0.0.1"), 7_000_000
+    monkeypatch.setattr(rtde, "monotonic_ns", lambda: now_ns)
+    made._note_freshness(Still())
+    now_ns += age_ns
+    if not is_stale:
+        made._note_freshness(Still())
+        return
+    with pytest.raises(StaleStateError, match="is 40 ms old"):
+        made._note_freshness(Still())
+
+
+def test_a_state_that_stands_still_is_found_within_50_ms_tick_and_package_counted_and_one_20_ms_late_is_borne():
+    assert STALE_NS + 2 * TICK_NS < 50_000_000
+    assert STALE_NS > 20_000_000 + 2 * TICK_NS

@@ -10,10 +10,12 @@ import pytest
 from perception.ground_truth import GroundTruthPerception
 from robot.errors import NotEngagedError, RobotConfigError, SafetyError, WireError
 from robot.local_station import LocalStation
-from robot.messages import GripCommand, Heading, JointTarget, PlantKind, StationMode
+from robot.messages import GripCommand, Heading, JointTarget, Outcome, PlantKind, StationMode, Verdict
 from robot.rigs import build_plant
 from robot.servo_client import ServoClient
+from robot.servo_messages import StrideReply
 from robot.servo_process import EXIT_TERMINATED
+from robot.tick_loop import Stride
 from tests.support.stations import fake_rig
 
 pytestmark = pytest.mark.realtime
@@ -229,3 +231,31 @@ def test_a_process_that_ends_says_nothing_over_what_a_person_reads(capfd):
     assert stride(made, go()).verdict is None
     made.close()
     assert capfd.readouterr() == ("", "")
+
+
+def test_a_latch_that_comes_just_before_a_time_step_is_asked_for_is_its_end(client, monkeypatch):
+    """It was told by the process's refusal, a SafetyError that ended the run: the word had been taken in unread."""
+    client.engage()
+    client.seed()
+    assert stride(client, go(height_m=float("nan"))).verdict.reason == "not_finite"
+    told = StrideReply(stride=stride_of(client), is_asked=False)
+    looks = [lambda: None, lambda: client._take_in(told)]
+    overhear = client._overhear
+    monkeypatch.setattr(client, "_overhear", lambda: (looks.pop(0) if looks else overhear)())
+    assert stride(client, go()).verdict.reason == "arm_mode"
+    assert client.why_lost is None, "it was taken"
+    client.engage()
+    client.seed()
+    assert stride(client, go()).verdict is None
+
+
+def stride_of(client):
+    """Return a time step that an arm's own stop cut short before it was begun."""
+    verdict = Verdict(
+        stamp_ns=0, sequence=-1, outcome=Outcome.REFUSED, reason="arm_mode", detail="a stop", is_latched=True
+    )
+    state = client._newest
+    return Stride(
+        before=state, after=state, is_begun=False, target_m=(0.0, 0.0, 0.0), limiters=(), is_in_contact=False,
+        verdict=verdict,
+    )  # fmt: skip
