@@ -28,7 +28,7 @@ def check(pair, kind, seed):
         pytest.skip(str(error))
     distance = compared.distance
     assert compared.start_m < 1e-4
-    assert distance.length_m > 0.1
+    assert distance.length_m > 0.05, "a leaf that stands may cut a descent short, not to nothing"
     assert distance.frechet_m <= FRECHET_M
     assert 0.0 < distance.offset_s <= OFFSET_S
 
