@@ -6,7 +6,7 @@ STAMP := $(VENV)/.installed
 RUN := runs/main
 BENCHES := twin grasp learning servo
 SAFETY_TESTS := $(addprefix tests/robot/test_,$(addsuffix .py,arming arming_words challenge checks checks_profile clearance \
-  collision_model gate gate_order lease profile_words refusals states stop_check stop_memory stopping tenure))
+  collision_model gate gate_order lease lease_words limits_words profile_words refusals states stop_check stop_memory stopping tenure))
 
 .PHONY: run setup check test test-slow bench mutation coverage clean
 

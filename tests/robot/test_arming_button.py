@@ -17,18 +17,12 @@ from robot.safety import AnsweredBy, ArmingButton, PressWatch
 from robot.safety.arming_button import GAP_NS, SETTLE_NS
 from robot.safety.challenge import LIFE_NS
 from tests.support.stations import fake_rig
+from tests.support.words import HostTime
 
 MS = 1_000_000
 SIGNAL = 9
 BIT = 1 << SIGNAL
 REAL = PlantIdentity(kind=PlantKind.REAL, model="ur5e", serial="20225500001")
-
-
-class HostTime:
-    now_ns = 5_000_000_000
-
-    def __call__(self):
-        return self.now_ns
 
 
 def seen(levels, *, every_ns=10 * MS):

@@ -1,30 +1,15 @@
 """What arming, leases, codes and limits say when they refuse, whole; and what they are before anybody did anything."""
 
-import math
-import re
-
 import pytest
 from msgspec.structs import replace
 
 from config.loader import load_arm
 from config.rig import PlantExpected
-from robot.errors import NotEngagedError, RobotConfigError, SafetyError
+from robot.errors import NotEngagedError, SafetyError
 from robot.hal.fake import FakeArm
 from robot.messages import PlantIdentity, PlantKind, StationMode, StationState
-from robot.safety import (
-    Answer,
-    AnsweredBy,
-    Arming,
-    Challenges,
-    GateLimits,
-    Grant,
-    LeaseBook,
-    Tenure,
-    TooManyLatchesError,
-    check_profile_fits,
-    draw_code,
-)
-from tests.support.profiles import profile
+from robot.safety import Answer, AnsweredBy, Arming, Challenges, Grant, TooManyLatchesError, draw_code
+from tests.support.words import HostTime, says
 
 ARM = load_arm("ur5e")
 SPEC = FakeArm(arm=ARM, tick_s=0.01).spec
@@ -32,14 +17,6 @@ FAKE = PlantIdentity(kind=PlantKind.FAKE, model="ur5e", serial="fake")
 REAL = PlantIdentity(kind=PlantKind.REAL, model="ur5e", serial="7")
 GRANT = Grant(source="teleop", profile="attended", lease=3)
 LIFE_NS = 1_000_000_000
-
-
-class Time:
-    def __init__(self, now_ns=5_000_000_000):
-        self.now_ns = now_ns
-
-    def __call__(self):
-        return self.now_ns
 
 
 def arming(kind="fake", *, most=1, window=10, challenges=None):
@@ -61,15 +38,11 @@ def in_mode(mode, **kwargs):
 
 def asking(*codes):
     drawn = iter(codes)
-    return Challenges(now_ns=Time(), draw=lambda: next(drawn))
+    return Challenges(now_ns=HostTime(), draw=lambda: next(drawn))
 
 
 def typed(text):
     return Answer(text, by=AnsweredBy.CONSOLE)
-
-
-def says(message):
-    return f"^{re.escape(message)}$"
 
 
 WHILE = {
@@ -266,7 +239,7 @@ def test_a_code_shown_while_disarmed_does_not_clear_a_latch():
 
 
 def test_what_is_wrong_with_an_answer_is_told():
-    host = Time()
+    host = HostTime()
     challenges = Challenges(now_ns=host, draw=lambda: "1234")
     message = "an answer to what the cell shows: nothing was asked, or it was answered already"
     with pytest.raises(SafetyError, match=says(message)):
@@ -294,216 +267,3 @@ def test_a_code_is_filled_up_with_zeros(monkeypatch):
     monkeypatch.setattr("robot.safety.challenge.secrets.randbelow", lambda n: asked.append(n) or 7)
     assert draw_code() == "0007"
     assert asked == [10_000]
-
-
-def test_a_lease_says_who_has_it_and_what_became_of_it():
-    host = Time()
-    book = LeaseBook(now_ns=host)
-    with pytest.raises(SafetyError, match=says("a lease: expected the name of its source, came none")):
-        book.take("")
-    lease = book.take("teleop", life_ns=LIFE_NS)
-    assert (lease.number, lease.life_ns) == (1, LIFE_NS)
-    message = "a lease for learner: teleop has it; it must be handed over or let go of first"
-    with pytest.raises(SafetyError, match=says(message)):
-        book.take("learner")
-    message = "a hand-over: expected the name of the source that takes over, came none"
-    with pytest.raises(SafetyError, match=says(message)):
-        book.hand_over(lease, "")
-    host.now_ns += LIFE_NS + 1
-    message = "the lease 1 of teleop has expired: nothing was heard in its time"
-    with pytest.raises(SafetyError, match=says(message)):
-        book.renew(lease)
-    book.revive(lease)
-    other = book.hand_over(lease, "learner", life_ns=2 * LIFE_NS)
-    assert (other.source, other.number, other.life_ns) == ("learner", 2, 2 * LIFE_NS)
-    with pytest.raises(SafetyError, match=says("the lease 1 of teleop has ended; learner has it now")):
-        book.revive(lease)
-    book.release(other)
-    with pytest.raises(SafetyError, match=says("the lease 2 of learner has ended; nobody has it now")):
-        book.renew(other)
-
-
-@pytest.mark.parametrize("how", ["renew", "revive", "hand over", "take"])
-def test_a_lease_lives_anew_from_the_moment_it_was_renewed(how):
-    host = Time()
-    book = LeaseBook(now_ns=host)
-    lease = book.take("a", life_ns=LIFE_NS)
-    host.now_ns += LIFE_NS
-    if how == "hand over":
-        lease = book.hand_over(lease, "b", life_ns=LIFE_NS)
-    elif how == "take":
-        lease = book.take("a", life_ns=LIFE_NS)
-    else:
-        getattr(book, how)(lease)
-    host.now_ns += LIFE_NS
-    assert book.is_in_force(lease)
-    host.now_ns += 1
-    assert not book.is_in_force(lease)
-
-
-def tenure(host, *, most=9):
-    made = arming(most=most)
-    return made, Tenure(arming=made, profile="attended", now_ns=host)
-
-
-def test_a_station_nobody_took_is_the_own_process_s_for_good():
-    host = Time()
-    _, held = tenure(host)
-    assert held.grant is None
-    assert held.renewed() == Grant(source="local", profile="attended", lease=1)
-    host.now_ns += 10**18
-    assert held.grant == Grant(source="local", profile="attended", lease=1)
-
-
-def test_a_tenure_tells_once_that_motion_was_taken_away():
-    host = Time()
-    made, held = tenure(host)
-    assert held.holds()
-    held.take("teleop", life_ns=LIFE_NS)
-    made.arm(identity=FAKE, by="tester", grant=held.renewed())
-    made.engage()
-    assert held.holds()
-    host.now_ns += LIFE_NS + 1
-    assert not held.holds()
-    assert held.holds()
-    assert made.state.mode is StationMode.DISARMED
-
-
-def test_a_hand_over_gives_the_lease_with_the_life_that_was_asked_for():
-    host = Time()
-    _, held = tenure(host)
-    message = "a hand-over: expected a source that has the lease, nobody has it"
-    with pytest.raises(SafetyError, match=says(message)):
-        held.hand_over("learner", life_ns=None)
-    assert held.take("teleop", life_ns=LIFE_NS).life_ns == LIFE_NS
-    lease = held.hand_over("learner", life_ns=3)
-    assert (lease.source, lease.life_ns) == ("learner", 3)
-    assert held.grant == Grant(source="learner", profile="attended", lease=2)
-    host.now_ns += 4
-    assert held.grant is None
-
-
-def test_ending_a_tenure_disarms_and_frees_the_lease():
-    made, held = tenure(Time())
-    held.end()
-    made.arm(identity=FAKE, by="tester", grant=held.renewed())
-    held.end()
-    assert (made.state.mode, made.state.reason) == (StationMode.DISARMED, "")
-    assert held.grant is None
-    assert held.renewed() == Grant(source="local", profile="attended", lease=2)
-    assert held.take("local", life_ns=None).number == 3
-
-
-def test_limits_say_what_does_not_fit():
-    with pytest.raises(RobotConfigError, match=says("the rig's arm file is for 'ur5e', the plant says 'ur10e'")):
-        GateLimits.of(ARM, replace(SPEC, model="ur10e"), table_m=0.0, tick_s=0.01)
-    high = ARM.joints[0].range_rad[1]
-    message = f"joint base: file and arm leave no range ({high} .. {high} rad)"
-    with pytest.raises(RobotConfigError, match=says(message)):
-        GateLimits.of(ARM, replace(SPEC, q_min_rad=(high, *SPEC.q_min_rad[1:])), table_m=0.0, tick_s=0.01)
-
-
-def test_every_limit_is_the_one_that_file_and_arm_give():
-    spec = replace(SPEC, q_min_rad=(-1.0,) * 6, q_max_rad=(2.0,) * 6, qd_max_rad_s=(0.5,) * 6, n_outputs=3)
-    motion, tool = ARM.motion, ARM.tool
-    (x0, y0, z0), (x1, y1, z1) = motion.workspace_m
-    rest_s = (
-        motion.leash_m / motion.speed_m_s
-        + motion.speed_m_s / motion.acceleration_m_s2
-        + motion.acceleration_m_s2 / motion.jerk_m_s3
-    )
-    assert GateLimits.of(ARM, spec, table_m=0.125, tick_s=0.01) == GateLimits(
-        q_min_rad=(-1.0,) * 6,
-        q_max_rad=(2.0,) * 6,
-        joint_step_rad=(0.5 * 0.01 * (1.0 + 1e-9),) * 6,
-        workspace_m=((x0 - 0.01, y0 - 0.01, z0 - 0.005), (x1 + 0.01, y1 + 0.01, z1 + 0.01)),
-        tip_min_m=0.125 + motion.table_clearance_m,
-        tracking_error_rad=motion.tracking_error_rad,
-        contact_n=motion.contact_force_n,
-        force_max_n=motion.force_limit_n,
-        impact_max_n=motion.impact_limit_n,
-        opening_m=(0.0, tool.stroke_m),
-        grip_force_n=tool.force_n,
-        grip_speed_m_s=tool.speed_m_s,
-        output_mask=0b111,
-        state_max_age_ns=round(motion.state_max_age_s * 1e9),
-        percept_max_age_ns=round((motion.percept_max_age_s + motion.intent_max_age_s + rest_s) * 1e9),
-        intent_max_age_ns=round((motion.intent_max_age_s + rest_s) * 1e9),
-    )
-
-
-def test_each_joint_has_its_own_limits_and_ages_are_to_the_nanosecond():
-    low, high = tuple(-1.0 - k for k in range(6)), tuple(0.5 + 0.25 * k for k in range(6))
-    speeds = tuple(0.5 + 0.1 * k for k in range(6))
-    slow = replace(ARM, motion=replace(ARM.motion, state_max_age_s=5.0, intent_max_age_s=5.0))
-    limits = GateLimits.of(
-        slow, replace(SPEC, q_min_rad=low, q_max_rad=high, qd_max_rad_s=speeds), table_m=0.0, tick_s=1.0
-    )
-    plain = GateLimits.of(ARM, SPEC, table_m=0.0, tick_s=1.0)
-    assert limits.q_min_rad == (*low[:2], max(low[2], ARM.joints[2].range_rad[0]), *low[3:])
-    assert limits.q_max_rad == high
-    assert limits.joint_step_rad == pytest.approx(speeds)
-    assert limits.state_max_age_ns == 5 * 10**9
-    shorter_s = 5.0 - ARM.motion.intent_max_age_s
-    assert abs(limits.intent_max_age_ns - plain.intent_max_age_ns - shorter_s * 1e9) <= 1.0
-
-
-@pytest.mark.parametrize("name", ["q_min_rad", "q_max_rad", "qd_max_rad_s"])
-def test_an_arm_of_another_number_of_joints_is_an_error_and_never_cut_short(name):
-    longer = replace(SPEC, **{name: (*getattr(SPEC, name), 0.0)})
-    with pytest.raises(ValueError, match="zip"):
-        GateLimits.of(ARM, longer, table_m=0.0, tick_s=0.01)
-    with pytest.raises(ValueError, match="zip"):
-        check_profile_fits(profile(), longer)
-
-
-@pytest.mark.parametrize("i", range(6))
-def test_a_profile_at_the_arms_limits_and_a_rounding_passes_and_the_next_float_does_not(i):
-    edge = replace(
-        profile().joints[i],
-        range_rad=(SPEC.q_min_rad[i] - 1e-3, SPEC.q_max_rad[i] + 1e-3),
-        speed_rad_s=SPEC.qd_max_rad_s[i] + 1e-3,
-    )
-    (low, high), speed = edge.range_rad, edge.speed_rad_s
-
-    def held(joint):
-        return profile(joints=tuple(joint if k == i else j for k, j in enumerate(profile().joints)))
-
-    check_profile_fits(held(edge), SPEC)
-    for beyond in (
-        replace(edge, range_rad=(math.nextafter(low, -math.inf), high)),
-        replace(edge, range_rad=(low, math.nextafter(high, math.inf))),
-        replace(edge, speed_rad_s=math.nextafter(speed, math.inf)),
-    ):
-        with pytest.raises(RobotConfigError):
-            check_profile_fits(held(beyond), SPEC)
-
-
-@pytest.mark.parametrize("i", range(6))
-def test_a_profile_may_differ_from_the_arm_by_rounding_and_no_more(i):
-    held = profile()
-    low, high = held.joints[i].range_rad
-    speed = held.joints[i].speed_rad_s
-
-    def but(values, value):
-        return tuple(value if k == i else v for k, v in enumerate(values))
-
-    for by, fits in ((0.0009, True), (0.0011, False)):
-        for spec, message in (
-            (replace(SPEC, q_min_rad=but(SPEC.q_min_rad, low + by)),
-             f"limits profile {held.name}: joints[{i}].range_rad: expected a range within the arm's own "
-             f"{low + by:.3f} .. {SPEC.q_max_rad[i]:.3f} rad, the file gives {low:.3f} .. {high:.3f}: "
-             "narrow it there"),
-            (replace(SPEC, q_max_rad=but(SPEC.q_max_rad, high - by)),
-             f"limits profile {held.name}: joints[{i}].range_rad: expected a range within the arm's own "
-             f"{SPEC.q_min_rad[i]:.3f} .. {high - by:.3f} rad, the file gives {low:.3f} .. {high:.3f}: "
-             "narrow it there"),
-            (replace(SPEC, qd_max_rad_s=but(SPEC.qd_max_rad_s, speed - by)),
-             f"limits profile {held.name}: joints[{i}].speed_rad_s: expected at most the arm's own {speed - by:.3f} "
-             f"rad/s, the file gives {speed:.3f}: lower it there"),
-        ):  # fmt: skip
-            if fits:
-                check_profile_fits(held, spec)
-            else:
-                with pytest.raises(RobotConfigError, match=says(message)):
-                    check_profile_fits(held, spec)

@@ -7,22 +7,16 @@ from config.rig import PlantExpected
 from robot.errors import SafetyError
 from robot.messages import PlantIdentity, PlantKind, StationMode
 from robot.safety import Answer, AnsweredBy, Arming, Challenges, Grant, draw_code
+from tests.support.words import HostTime
 
 LIFE_NS = 10_000_000_000
 REAL = PlantIdentity(kind=PlantKind.REAL, model="ur5e", serial="20225500001")
 GRANT = Grant(source="teleop", profile="attended", lease=3)
 
 
-class HostTime:
-    now_ns = 7_000_000_000
-
-    def __call__(self):
-        return self.now_ns
-
-
 @pytest.fixture
 def host():
-    return HostTime()
+    return HostTime(now_ns=7_000_000_000)
 
 
 @pytest.fixture

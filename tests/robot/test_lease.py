@@ -6,15 +6,9 @@ from hypothesis import strategies as st
 
 from robot.errors import SafetyError
 from robot.safety import LeaseBook
+from tests.support.words import HostTime
 
 LIFE_NS = 1_000_000_000
-
-
-class HostTime:
-    now_ns = 5_000_000_000
-
-    def __call__(self):
-        return self.now_ns
 
 
 @pytest.fixture

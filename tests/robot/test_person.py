@@ -14,15 +14,9 @@ from robot.person import PersonOperator
 from robot.rigs import build_station
 from sim_twin.operator import SimulatedOperator
 from tests.support.stations import fake_rig
+from tests.support.words import HostTime
 
 REAL = PlantIdentity(kind=PlantKind.REAL, model="ur5e", serial="20225500001")
-
-
-class HostTime:
-    now_ns = 0
-
-    def __call__(self):
-        return self.now_ns
 
 
 class Somebody:
@@ -47,7 +41,7 @@ class Somebody:
 @pytest.fixture
 def cell():
     """A real arm as far as anybody can tell, its pendant, and its host's clock."""
-    resolved, host, pendant = fake_rig(), HostTime(), []
+    resolved, host, pendant = fake_rig(), HostTime(now_ns=0), []
     expected = msgspec.structs.replace(resolved.rig.expected, kind="real", serial=REAL.serial)
     resolved = msgspec.structs.replace(resolved, rig=msgspec.structs.replace(resolved.rig, expected=expected))
     plant = FakePlant(arm=resolved.arm, scenario=resolved.scenario, rig=resolved.rig)
@@ -104,7 +98,7 @@ def test_a_latch_takes_a_look_a_code_and_a_key(cell):
 
 
 def test_where_nothing_else_can_show_it_the_console_does():
-    resolved, host = fake_rig(), HostTime()
+    resolved, host = fake_rig(), HostTime(now_ns=0)
     station = build_station(resolved, host_ns=host)
     PersonOperator(Somebody([], host)).arm_once(station)
     assert station.state.mode is StationMode.ENGAGED

@@ -11,23 +11,17 @@ from robot.rigs import build_station
 from robot.safety import Arming, Grant
 from sim_twin.operator import SimulatedOperator
 from tests.support.stations import fake_rig
+from tests.support.words import HostTime
 
 LIFE_NS = 500_000_000
 GRANT = Grant(source="teleop", profile="attended", lease=1)
 IDENTITY = PlantIdentity(kind=PlantKind.FAKE, model="ur5e", serial="fake")
 
 
-class HostTime:
-    now_ns = 0
-
-    def __call__(self):
-        return self.now_ns
-
-
 @pytest.fixture
 def world():
     """A station of a teleoperator's, engaged, with its plant and its host's clock."""
-    resolved, host = fake_rig(), HostTime()
+    resolved, host = fake_rig(), HostTime(now_ns=0)
     plant = FakePlant(arm=resolved.arm, scenario=resolved.scenario, rig=resolved.rig)
     station = build_station(resolved, plant=plant, host_ns=host)
     station.take_lease("teleop", life_ns=LIFE_NS)

@@ -1,73 +1,26 @@
 """Every kind of breach is brought about on the physics itself and must be seen; just inside the limit it must not."""
 
 import msgspec
-import mujoco
 import numpy as np
 import pytest
 
-from config.limits import ArmPart, KeepOut, Plane, Profile, Touched
+from config.limits import ArmPart, KeepOut, Plane, Touched
 from config.loader import resolve
 from config.posture import part_points
 from sim_twin.allowances import allowances_for
 from sim_twin.monitor import Monitor
 from sim_twin.names import on_table
-from sim_twin.perturb import NOMINAL, PERTURBATIONS, perturbed_plant
+from sim_twin.perturb import NOMINAL, perturbed_plant
 from sim_twin.readings import Reading
-from sim_twin.recorder import PartKind, Recorder, part_kinds
+from sim_twin.recorder import PartKind, part_kinds
+from tests.support.monitor_stage import Stage
 
 replace = msgspec.structs.replace
-N_TICKS = 150
 
 
 @pytest.fixture(scope="module")
 def resolved():
     return resolve(rig="twin")
-
-
-class Stage:
-    """A twin whose physics is set by hand, recorded, and judged."""
-
-    def __init__(self, resolved) -> None:
-        self.plant = perturbed_plant(resolved, NOMINAL)
-        attended = resolved.limits.profile("attended")
-        joints = tuple(
-            replace(
-                j,
-                speed_rad_s=1.0,
-                acceleration_rad_s2=10.0,
-                jerk_rad_s3=400.0,
-                stop_acceleration_rad_s2=20.0,
-                stop_jerk_rad_s3=1500.0,
-            )
-            for j in attended.joints
-        )
-        self.world, self.profile = self.plant.world, replace(attended, joints=joints)
-        self.recorder = Recorder(self.world, most_ticks=N_TICKS)
-        self.plant.arm.connect()
-        self.lay_out()
-
-    def lay_out(self, digital_out: int = 0) -> None:
-        self.plant.resetter.reset(seed=0, epoch=0, digital_out=digital_out)
-        self.recorder.clear()
-
-    @property
-    def data(self) -> mujoco.MjData:
-        return self.world.data
-
-    def put(self, q=None, qd=None) -> None:
-        if q is not None:
-            self.data.qpos[:6] = q
-            self.data.ctrl[self.world.joint_controls] = q
-        self.data.qvel[:6] = 0.0 if qd is None else qd
-
-    def tick(self, n: int = 1) -> None:
-        for _ in range(n):
-            self.world.advance()
-
-    def judge(self, profile: Profile | None = None) -> dict[str, Reading]:
-        held = profile or self.profile
-        monitor = Monitor(self.world, held, allowances_for(held, NOMINAL))
-        return {r.limit: r for r in monitor.judge(self.recorder.course())}
 
 
 @pytest.fixture(scope="module")
@@ -398,42 +351,6 @@ def test_recording_changes_nothing_of_the_physics(resolved, stage):
         for _ in range(20):
             world.advance()
     assert (plain.world.data.qpos == stage.data.qpos).all()
-
-
-@pytest.mark.parametrize("by", PERTURBATIONS[1:], ids=lambda p: p.name)
-def test_a_perturbed_plant_differs_in_what_it_says_and_nobody_is_told(resolved, by):
-    nominal, other = perturbed_plant(resolved, NOMINAL), perturbed_plant(resolved, by)
-    assert other.arm.spec == nominal.arm.spec
-    assert other.identity == nominal.identity
-    ends = []
-    for plant in (nominal, other):
-        plant.arm.connect()
-        world = plant.world
-        world.data.qpos[:6] = world.data.ctrl[world.joint_controls] = world.arm.home_rad
-        world.data.qvel[:6] = 0.0
-        for k in range(60):
-            world.data.ctrl[world.joint_controls[0]] += 0.005 * (k < 30)
-            if k == 25 and by.braking_factor != 1.0:
-                plant.arm.stop()
-            world.advance()
-            if k == 27 and by.lag_factor != 1.0:
-                break
-        ends.append(np.array(plant.arm.read().tcp_position_m))
-    apart = float(np.linalg.norm(ends[1] - ends[0]))
-    assert 2e-4 < apart < 0.05
-
-
-def test_a_payload_that_is_not_compensated_makes_the_tool_droop_and_one_that_is_absent_makes_it_rise(resolved):
-    heights = {}
-    for by in PERTURBATIONS:
-        if by.payload_kg or by is NOMINAL:
-            plant = perturbed_plant(resolved, by)
-            plant.arm.connect()
-            for _ in range(60):
-                plant.world.advance()
-            heights[by.payload_kg] = plant.arm.read().tcp_position_m[2]
-    assert heights[1.0] < heights[0.0] - 2e-4 < heights[0.0] + 2e-4 < heights[-1.0]
-    assert heights[-1.0] - heights[1.0] < 0.01
 
 
 def test_the_elbow_is_where_the_files_say_it_is_and_not_beside_the_arm(stage):

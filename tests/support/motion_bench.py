@@ -10,10 +10,12 @@ from robot.layout import draw_layout
 from sim_twin.controller.motion.core import Motion
 from sim_twin.controller.motion.drive import TwinDrive
 from sim_twin.controller.motion.kinematics import ArmKinematics, dh_rows
+from sim_twin.controller.motion.limits import Breach
 from sim_twin.controller.motion.motions import Motions
+from sim_twin.controller.motion.poses import pose_from_matrix
 from sim_twin.plant import TwinWorld
 
-__all__ = ["HOME", "Trace", "make_bench", "make_drive", "play"]
+__all__ = ["HOME", "Trace", "idle", "make_bench", "make_drive", "over_the_table", "play"]
 
 ARM = resolve().arm
 HOME = np.array(ARM.home_rad)
@@ -45,6 +47,12 @@ class Trace:
 
     def here(self) -> np.ndarray:
         return self.motions.core.tool_at(self.motions.setpoint.q_target)
+
+    def shifted(self, dx: float = 0.0, dy: float = 0.0, dz: float = 0.0) -> np.ndarray:
+        """Returns the pose (six numbers, base frame) that is so many metres beside the set-point's."""
+        pose = pose_from_matrix(self.here())
+        pose[:3] += (dx, dy, dz)
+        return pose
 
     def end(self) -> None:
         self.motions.core.end_slice(self.sensed)
@@ -95,10 +103,28 @@ def make_drive(q_rad: np.ndarray = HOME, *, is_engaged: bool = True) -> TwinDriv
     return drive
 
 
-def play(drive: TwinDrive, *programs: Motion):
+def play(drive: TwinDrive, *programs: Motion) -> Breach | None:
     """Run motions on the physics; return the first breach, None where there was none."""
     for _ in chain(programs):
         breach = drive.tick()
         if breach is not None:
             return breach
     return None
+
+
+def idle(drive: TwinDrive, n: int) -> Breach | None:
+    """Lets ``n`` slices pass, or as many as there are before a breach; returns it."""
+    for _ in range(n):
+        breach = drive.tick()
+        if breach is not None:
+            return breach
+    return None
+
+
+def over_the_table(drive: TwinDrive, z: float) -> None:
+    """Brings the tool to a free place over the table, ``z`` metres over the base, slowly from above."""
+    pose = drive.measured.tcp_pose.copy()
+    pose[:3] = (0.40, 0.10, 0.15)
+    assert play(drive, drive.motions.moves.movej(pose, is_pose=True)) is None
+    pose[2] = z
+    assert play(drive, drive.motions.moves.movel(pose, v=0.1)) is None

@@ -10,20 +10,14 @@ import pytest
 from robot.errors import RobotConfigError
 from robot.teleop.keyboard import Keyboard
 from robot.teleop.keys import HELD_NS
-
-
-class Time:
-    now_ns = 10_000_000_000
-
-    def __call__(self):
-        return self.now_ns
+from tests.support.words import HostTime
 
 
 @pytest.fixture
 def typed():
     """A keyboard, who types on it, and its time."""
     typist, terminal = os.openpty()
-    time = Time()
+    time = HostTime(now_ns=10_000_000_000)
     board = Keyboard(detail="", now_ns=time, step_s=0.02, terminal=terminal)
     board.connect()
     yield board, typist, terminal, time
@@ -87,7 +81,7 @@ def said_to(typist):
 def test_the_terminal_is_given_back_as_it_was_and_what_was_not_read_is_dropped():
     typist, terminal = os.openpty()
     before = termios.tcgetattr(terminal)
-    board = Keyboard(detail="", now_ns=Time(), step_s=0.02, terminal=terminal)
+    board = Keyboard(detail="", now_ns=HostTime(now_ns=10_000_000_000), step_s=0.02, terminal=terminal)
     board.connect()
     assert termios.tcgetattr(terminal) != before
     os.write(typist, b"wwwww")
@@ -112,8 +106,8 @@ def test_a_terminal_that_goes_away_ends_the_drive(typed):
 def test_what_is_no_terminal_is_told():
     read, write = os.pipe()
     with pytest.raises(RobotConfigError, match="expected a terminal"):
-        Keyboard(detail="", now_ns=Time(), step_s=0.02, terminal=read).connect()
+        Keyboard(detail="", now_ns=HostTime(now_ns=10_000_000_000), step_s=0.02, terminal=read).connect()
     os.close(read)
     os.close(write)
     with pytest.raises(RobotConfigError, match="nothing after it"):
-        Keyboard(detail="fast", now_ns=Time(), step_s=0.02)
+        Keyboard(detail="fast", now_ns=HostTime(now_ns=10_000_000_000), step_s=0.02)

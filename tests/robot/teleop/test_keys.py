@@ -7,18 +7,12 @@ from hypothesis import strategies as st
 from robot.messages import Grip
 from robot.teleop.device import Frame
 from robot.teleop.keys import HELD_NS, PAUSE_NS, KeyBoard, KeyEvent, Kind, decode
-
-
-class Time:
-    now_ns = 10_000_000_000
-
-    def __call__(self):
-        return self.now_ns
+from tests.support.words import HostTime
 
 
 @pytest.fixture
 def time():
-    return Time()
+    return HostTime(now_ns=10_000_000_000)
 
 
 @pytest.fixture
