@@ -42,7 +42,7 @@ def lab_by_person(tmp_path):
         yield tmp_path, controller, host
 
 
-def until(is_true, timeout_s=30.0):
+def until(is_true, timeout_s=90.0):
     end = time.monotonic() + timeout_s
     while not is_true():
         assert time.monotonic() < end
