@@ -1,7 +1,7 @@
 """The root command and the bench command."""
 
 import json
-from importlib.metadata import EntryPoint
+from importlib.metadata import EntryPoint, version
 
 import pytest
 from typer.testing import CliRunner
@@ -94,6 +94,11 @@ def test_help_lists_every_sub_command_even_one_that_cannot_be_loaded(call):
     for name in COMMANDS:
         assert name in result.stdout
     assert "Do what was asked." in result.stdout
+
+
+def test_the_version_is_the_installed_packages(call):
+    result = call("--version")
+    assert (result.exit_code, result.stdout) == (0, f"autotelic {version('autotelic')}\n")
 
 
 @pytest.mark.parametrize(
