@@ -28,7 +28,7 @@ check: setup
 
 # What keeps to a wall's clock runs alone; the rest shares the processors.
 test: check
-	$(BIN)/pytest -m "not slow and not realtime" --numprocesses auto --dist loadfile
+	$(BIN)/pytest -m "not slow and not realtime" --numprocesses auto --dist loadfile --no-loadscope-reorder
 	$(BIN)/pytest -m "not slow and realtime"
 
 test-slow: setup

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import torch
 from torch import nn
+from torch.optim.adam import adam
 
 __all__ = ["Array", "Network", "descend_together", "normalised", "width"]
 
@@ -63,16 +64,9 @@ class Network:
             bound = np.sqrt(6.0 / view.shape[1]) if view.ndim == 2 else 0.0
             view[...] = rng.uniform(-bound, bound, view.shape)
         self._views[-2] *= output_scale
-        self.optimiser = torch.optim.Adam(self._parameters, lr=learning_rate, betas=(0.9, 0.99), eps=1e-5, fused=True)
-
-    @property
-    def learning_rate(self) -> float:
+        self._moments = [_no_moments(p) for p in self._parameters]
+        self.learning_rate = learning_rate
         """Adam's step."""
-        return self.optimiser.param_groups[0]["lr"]
-
-    @learning_rate.setter
-    def learning_rate(self, rate: float) -> None:
-        self.optimiser.param_groups[0]["lr"] = rate
 
     def rate(self, x: Array) -> Array:
         """Return the network's output for each row.  (k, n_in) float32 -> (k, n_out)"""
@@ -90,27 +84,53 @@ class Network:
 
     def state_dict(self) -> dict[str, Any]:
         """Return weights and Adam's moments, in the order of the layers."""
-        moments = [self.optimiser.state.get(p, {}) for p in self._parameters]
         return {
             "weights": [view.copy() for view in self._views],
-            "moments": [{k: v.numpy().copy() for k, v in m.items()} for m in moments],
+            "moments": [{k: v.numpy().copy() for k, v in m.items()} for m in self._moments],
         }
 
     def load_state_dict(self, state: dict[str, Any]) -> None:
         """Restore bit for bit."""
         for view, weights in zip(self._views, state["weights"], strict=True):
             view[...] = weights
-        self.optimiser.state.clear()
-        for parameter, moments in zip(self._parameters, state["moments"], strict=True):
-            if moments:
-                self.optimiser.state[parameter] = {k: torch.from_numpy(np.array(v)) for k, v in moments.items()}
+        self._moments = [
+            {k: torch.from_numpy(np.array(v)) for k, v in moments.items()} or _no_moments(parameter)
+            for parameter, moments in zip(self._parameters, state["moments"], strict=True)
+        ]
+
+    def forget_gradients(self) -> None:
+        """Begin a descent anew."""
+        for parameter in self._parameters:
+            parameter.grad = None
+
+    @torch.no_grad()
+    def step(self) -> None:
+        """Take one step of Adam down the gradients that came.
+
+        By torch's function, not its class: the class imports a compiler, a second and a half of every start.
+        """
+        at = [i for i, p in enumerate(self._parameters) if p.grad is not None]
+        gradients = [g for p in self._parameters if (g := p.grad) is not None]
+        first, second, steps = ([self._moments[i][name] for i in at] for name in ("exp_avg", "exp_avg_sq", "step"))
+        adam(
+            [self._parameters[i] for i in at], gradients, first, second, [], steps, fused=True, amsgrad=False,
+            beta1=0.9, beta2=0.99, lr=self.learning_rate, weight_decay=0.0, eps=1e-5, maximize=False,
+        )  # fmt: skip
 
 
 def descend_together(loss: torch.Tensor, *networks: Network) -> float:
     """Take one step of Adam down a loss in several networks at once and return the loss."""
     for network in networks:
-        network.optimiser.zero_grad()
+        network.forget_gradients()
     loss.backward()
     for network in networks:
-        network.optimiser.step()
+        network.step()
     return float(loss.detach())
+
+
+def _no_moments(parameter: nn.Parameter) -> dict[str, torch.Tensor]:
+    return {
+        "step": torch.zeros((), dtype=torch.float32),
+        "exp_avg": torch.zeros_like(parameter, memory_format=torch.preserve_format).detach(),
+        "exp_avg_sq": torch.zeros_like(parameter, memory_format=torch.preserve_format).detach(),
+    }

@@ -13,7 +13,7 @@ from learning.rows import GoalRow, TrialRow, read_rows
 from tests.support.toy_run import FILES, files_of
 
 ROOT = Path(__file__).parents[2]
-QUICK = "experiment: {trials: 3, steps: 40, evaluate_every: 4, test_epochs: 1, checkpoint_every: 2}\n"
+QUICK = "experiment: {trials: 2, steps: 30, evaluate_every: 4, test_epochs: 1, checkpoint_every: 2}\n"
 
 
 def command(preset, out, *arguments):
@@ -55,10 +55,11 @@ def test_a_run_on_the_twin_is_whole_and_physics_did_something(whole):
     assert any("1" in row.state_after for row in trials)
 
 
-def test_killed_and_resumed_with_a_worker_is_identical(preset, whole, tmp_path):
+@pytest.mark.parametrize("kills", [(3,), pytest.param((2, 5, 6), marks=pytest.mark.slow)], ids=["once", "thrice"])
+def test_killed_and_resumed_with_a_worker_is_identical(preset, whole, tmp_path, kills):
     out = tmp_path / "killed"
     arguments = ("--epochs", 8, "--workers", 1)
-    for n_epochs in (3, 6):
+    for n_epochs in kills:
         with subprocess.Popen(command(preset, out, *arguments), cwd=ROOT, stderr=subprocess.DEVNULL) as process:
             while _n_epochs(out) < n_epochs and process.poll() is None:
                 time.sleep(0.02)
