@@ -314,8 +314,8 @@ class LocalStation:
         except RobotConfigError:
             raise
         except RobotError as error:
+            self._arming.latch(str(error))  # told first: stopping takes its time
             self._loop.stop()
-            self._arming.latch(str(error))
             raise
 
     def _seed(self) -> Percept:
@@ -360,9 +360,9 @@ class LocalStation:
 
     def _lose_sight(self, state: ArmState, why: str) -> Verdict:
         """Stop and latch: without a percept nobody may move the arm on."""
-        self._loop.stop()
         reason = Reason.STALE_STATE.value
-        self._arming.latch(f"{reason}: {why}")
+        self._arming.latch(f"{reason}: {why}")  # told first: stopping takes its time
+        self._loop.stop()
         return Verdict(
             stamp_ns=state.stamp_ns, sequence=-1, outcome=Outcome.REFUSED, reason=reason, detail=why, is_latched=True
         )

@@ -53,9 +53,22 @@ class OperatedStation:
         self._pause = pause
 
     def connect(self) -> None:
-        """Arm the station, if there is an operator and it is not armed yet."""
-        if self._operator is not None and self._station.state.mode is StationMode.DISARMED:
+        """Arm the station, if there is an operator and it is not armed yet.
+
+        An arm that stops meanwhile has latched: the first reset arms it again, as after any other stop.
+
+        Raises:
+            RobotError: the operator refuses, the arm cannot be reached, or a file is wrong.
+        """
+        if self._operator is None or self._station.state.mode is not StationMode.DISARMED:
+            return
+        try:
             self._operator.arm_once(self._station)
+        except RobotConfigError:
+            raise
+        except RobotError:
+            if self._station.state.mode is not StationMode.LATCHED:
+                raise
 
     @property
     def spec(self) -> StationSpec:

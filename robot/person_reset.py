@@ -25,6 +25,10 @@ class _Stops(Protocol):
         """Stop the arm and give up command."""
         ...
 
+    def await_rest(self) -> None:
+        """Wait until an arm that was lost must be at rest."""
+        ...
+
 
 class PersonResetter:
     """Implements robot.hal.protocols.Resetter with a person's hands.
@@ -54,6 +58,7 @@ class PersonResetter:
         """
         del digital_out  # lamps and lids follow the cell's program as soon as the arm is taken again
         self._loop.stop()
+        self._loop.await_rest()
         layout = self.layout_of(seed=seed, epoch=epoch)
         path = self._pictures / f"epoch-{epoch:05d}-seed-{seed}.png"
         from robot.layout_picture import draw_picture  # brings matplotlib, which only a person needs
@@ -86,6 +91,7 @@ class PersonLook:
         """Let the person see to whatever is wrong. Raises SafetyError where nobody is there any more."""
         del seed, epoch, digital_out
         self._loop.stop()
+        self._loop.await_rest()
         self._person.await_key("the arm is disarmed: see to what is wrong at the table, take your hands off it")
 
 

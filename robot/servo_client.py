@@ -4,16 +4,15 @@ from collections.abc import Callable
 from multiprocessing import get_context
 from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
-from time import sleep
+from time import monotonic, sleep
 from typing import TypeVar
 
 import msgspec
 
 from config.resolved import Resolved
-from robot import errors
 from robot.errors import NotEngagedError, RobotError, StaleStateError, WireError
-from robot.messages import ArmState, GripCommand, Intent, Outcome, PlantIdentity, Vec3, Verdict
-from robot.safety import Reason
+from robot.messages import ArmState, GripCommand, Intent, PlantIdentity, Vec3
+from robot.servo_failures import cut_short, error_of
 from robot.servo_messages import (
     BeginEpoch,
     Close,
@@ -84,6 +83,8 @@ class ServoClient:
         self._is_refusal_due = False
         """It crossed a time step on the way, which will be refused."""
         self._why_lost: str | None = None
+        self._rests_at_s = 0.0
+        """Host's monotonic time at which an arm that was lost rests at the latest."""
         self._newest: ArmState | None = None
         self._n_strides = 0
         """Asked for since the arm was seeded."""
@@ -129,7 +130,7 @@ class ServoClient:
         self._overhear()
         if not self._is_gone:
             return
-        self._await_end()
+        self.await_rest()
         context = get_context("spawn")
         ours, theirs = context.Pipe()
         pulse = context.RawArray("q", 1)
@@ -154,9 +155,9 @@ class ServoClient:
         self._is_in_command = True
 
     def stop(self) -> None:
-        """Stop the arm and give up command. Where no process holds it any more, wait until its own watchdog has.
+        """Stop the arm and give up command; return once it rests, or at once where it is lost.
 
-        A loss that nobody has noticed yet is still told afterwards.
+        A loss is told as soon as it is known: whoever needs the arm at rest waits for that himself (`await_rest`).
         """
         self._overhear()
         if not self._is_gone:
@@ -166,12 +167,18 @@ class ServoClient:
             except WireError as error:
                 self._is_in_command = False
                 if was_in_command:
-                    self._why_lost = str(error)
+                    self._note_loss(str(error))
             else:
                 self._is_in_command = False
                 return
-        self._await_end()
-        sleep(COAST_S)
+        if self._process is None or not self._process.is_alive():
+            self._kill()
+
+    def await_rest(self) -> None:
+        """Wait until an arm that was lost must be at rest, by its process or its own watchdog; others rest already."""
+        if self._is_gone:
+            self._await_end()
+            sleep(max(0.0, self._rests_at_s - monotonic()))
 
     def begin_epoch(self, epoch: int) -> int:
         """Take up the rules of an epoch and return the outputs it begins with."""
@@ -220,7 +227,7 @@ class ServoClient:
                 )  # fmt: skip
                 told = self._exchange(request, StrideReply, n_ticks * self._tick_s + STRIDE_SLACK_S)
         except WireError as error:
-            return _cut_short(self._newest, str(error))
+            return cut_short(self._newest, str(error))
         stride = told.stride
         self._is_leaving |= stride.verdict is not None and stride.verdict.reason in ENDING_REASONS
         self._newest, self.is_in_contact = stride.after, stride.is_in_contact
@@ -285,7 +292,7 @@ class ServoClient:
             )
         if isinstance(reply, Failure):
             self._is_leaving |= reply.is_end
-            raise _error(reply)
+            raise error_of(reply)
         assert isinstance(reply, expected), f"{type(request).__name__} was answered by {type(reply).__name__}"
         return reply
 
@@ -349,7 +356,8 @@ class ServoClient:
 
     def _kill(self) -> None:
         if self._is_in_command:
-            self._why_lost, self._is_in_command = self._how_it_ended(), False
+            self._is_in_command = False
+            self._note_loss(self._how_it_ended())
         process, self._process = self._process, None
         connection, self._connection = self._connection, None
         watch, self._watch = self._watch, None
@@ -363,20 +371,5 @@ class ServoClient:
                 process.kill()
             process.join(CLOSE_S)
 
-
-def _cut_short(state: ArmState, why: str) -> Stride:
-    """Return the time step that a process which is gone came to, as far as anybody knows: nothing."""
-    verdict = Verdict(
-        stamp_ns=state.stamp_ns, sequence=-1, outcome=Outcome.REFUSED, reason=Reason.STALE_STATE.value, detail=why,
-        is_latched=True,
-    )  # fmt: skip
-    return Stride(
-        before=state, after=state, is_begun=False, target_m=state.tcp_position_m, limiters=(), is_in_contact=False,
-        verdict=verdict,
-    )  # fmt: skip
-
-
-def _error(failure: Failure) -> RobotError:
-    """Return the error that the process raised, or its nearest kind."""
-    kind = getattr(errors, failure.kind, WireError)
-    return kind(failure.message)
+    def _note_loss(self, why: str) -> None:
+        self._why_lost, self._rests_at_s = why, monotonic() + COAST_S

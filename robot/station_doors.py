@@ -54,7 +54,11 @@ class Holder(Protocol):
         ...
 
     def stop(self) -> None:
-        """Stop the arm and give up command."""
+        """Stop the arm and give up command; where it is lost that is told at once, before it rests."""
+        ...
+
+    def await_rest(self) -> None:
+        """Wait until an arm that was lost must be at rest."""
         ...
 
     def close(self) -> None:

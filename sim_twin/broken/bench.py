@@ -5,7 +5,7 @@ from time import perf_counter
 from robot.bench import BenchReport, BenchResult, bench_report
 from sim_twin.broken.course import Course
 from sim_twin.broken.outcome import Outcome
-from sim_twin.broken.trials import TRIALS, Trial
+from sim_twin.broken.trials import TOLD_S, TRIALS, Trial
 from sim_twin.broken.tries import CutShortError, DisturbedError
 
 __all__ = ["bench_faults"]
@@ -41,8 +41,8 @@ def _told(outcome: Outcome) -> BenchResult:
     details = outcome.details()
     if failures:
         details["wrong"] = "; ".join(failures)
-    goal = f"<= {1e3 * outcome.trial.noticed_s:g}, rest, stay" if outcome.trial.is_stop else "borne"
-    value = 1e3 * (outcome.noticed_s or 0.0)
+    goal = f"<= {1e3 * TOLD_S:g}, rest, stay" if outcome.trial.is_stop else "borne"
+    value = 1e3 * (outcome.told_s or 0.0)
     return BenchResult(
         name=outcome.trial.name, value=round(value, 1), unit="ms", goal=goal, ok=not failures, details=details
     )

@@ -1,25 +1,31 @@
 """One fault after the other against an arm under way: what was said, how soon, how it rested, what came after."""
 
 import os
+from contextlib import ExitStack
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from time import monotonic, sleep
 from types import TracebackType
 from typing import Self
 
+import msgspec
+
 from robot.errors import RobotError
+from robot.hal.ur_primary import read_facts
 from sim_twin.broken.judge import Judged, Motion
 from sim_twin.broken.outcome import Outcome
 from sim_twin.broken.pendant import Pendant
+from sim_twin.broken.proof import Proof, Shows, Sight
 from sim_twin.broken.rider import NEVER_S, Raised, Rider
 from sim_twin.broken.trials import JOG_RAD, Moment, Stage, Trial
 from sim_twin.broken.tries import DisturbedError, in_peace
+from sim_twin.broken.witness import Witness
 from sim_twin.controller.process import ControllerProcess, ask_fault
 from sim_twin.controller.server import Setup
 
 __all__ = ["Course"]
 
-BORNE_S = 1.5
+BORNE_S, BEFORE_S, DURING_S = 2.0, 0.4, 0.7
 SETTLE_S, AFTER_S, REST_LIMIT_S = 0.3, 0.5, 8.0
 
 
@@ -67,16 +73,20 @@ class Course:
 
     def _try(self, trial: Trial) -> Outcome:
         trace = Path(self._folder.name) / "trace"
-        with ControllerProcess(Setup(host=self._host, trace=str(trace))), Rider(self._host) as rider:
+        with ExitStack() as stack:
+            stack.enter_context(ControllerProcess(Setup(host=self._host, trace=str(trace))))
+            rider = stack.enter_context(Rider(self._host))
+            witness = None if trial.shows is None else stack.enter_context(Witness(self._host, trace))
             stage = Stage(host=self._host, rider=rider, pendant=Pendant(self._host))
-            return _Run(trial, stage, Motion(trace)).run()
+            return _Run(trial, stage, Motion(trace), witness).run()
 
 
 class _Run:
     """One fault, start to end."""
 
-    def __init__(self, trial: Trial, stage: Stage, motion: Motion) -> None:
-        self._trial, self._stage, self._motion = trial, stage, motion
+    def __init__(self, trial: Trial, stage: Stage, motion: Motion, witness: Witness | None) -> None:
+        self._trial, self._stage, self._motion, self._witness = trial, stage, motion, witness
+        self._proof: Proof | None = None
 
     def run(self) -> Outcome:
         trial, stage, rider = self._trial, self._stage, self._stage.rider
@@ -107,7 +117,8 @@ class _Run:
         return Outcome(
             trial=trial,
             raised=raised,
-            noticed_s=None if raised is None else raised.at_s - happened_s,
+            told_s=None if raised is None else raised.at_s - happened_s,
+            proof=self._proof,
             stop=stop,
             barred=barred,
             held=held,
@@ -122,7 +133,9 @@ class _Run:
         trial, stage, rider = self._trial, self._stage, self._stage.rider
 
         def begin() -> float:
-            return trial.begin(stage)
+            if self._witness is None or trial.shows is None:
+                return trial.begin(stage)
+            return self._watched(trial.shows, self._witness)
 
         match trial.during:
             case Moment.ENGAGE:
@@ -135,6 +148,17 @@ class _Run:
             case Moment.RIDE:
                 rider.take()
                 return rider.ride_into(begin, wait_s=NEVER_S if trial.is_stop else BORNE_S)
+
+    def _watched(self, shows: Shows, witness: Witness) -> float:
+        """Let the fault happen and last before the eyes of a second client, and return when it did."""
+        stage = self._stage
+        facts, before = read_facts(stage.host), witness.look(BEFORE_S)
+        stage.answers.clear()
+        happened_s = self._trial.begin(stage)
+        during = witness.look(DURING_S)
+        sight = Sight(before=before, during=during, facts=(facts, read_facts(stage.host)), rows=_rows_in(stage.answers))
+        self._proof = shows(sight)
+        return happened_s
 
     def _jog(self) -> tuple[float | None, float | None]:
         """Return how far somebody moved a joint, and when he began."""
@@ -175,3 +199,9 @@ class _Run:
             self._rest_s = monotonic()
             judged = self._motion.judge(happened_s, self._rest_s, begins_s=self._trial.begins_s)
         return judged
+
+
+def _rows_in(answers: dict[str, dict[str, object]]) -> tuple[tuple[float, float, float, float], ...]:
+    """Return what a calibration told that it added to the arm's rows; nothing where there was none."""
+    told = answers.get("calibrate", {}).get("rows", [])
+    return msgspec.convert(told, tuple[tuple[float, float, float, float], ...])

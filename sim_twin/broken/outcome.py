@@ -3,8 +3,9 @@
 import msgspec
 
 from sim_twin.broken.judge import Judged
+from sim_twin.broken.proof import Proof
 from sim_twin.broken.rider import Raised
-from sim_twin.broken.trials import JOG_RAD, Trial
+from sim_twin.broken.trials import JOG_RAD, TOLD_S, Trial
 
 __all__ = ["Outcome"]
 
@@ -18,7 +19,10 @@ class Outcome(msgspec.Struct, frozen=True, kw_only=True):
 
     trial: Trial
     raised: Raised | None
-    noticed_s: float | None
+    told_s: float | None
+    """How soon after it happened that was told."""
+    proof: Proof | None
+    """Whether a fault that was borne was there at all."""
     stop: Judged | None
     held: str | None
     """Who held an arm whose link was lost, a while after; None where nobody did."""
@@ -37,8 +41,12 @@ class Outcome(msgspec.Struct, frozen=True, kw_only=True):
         wrong = list(self._wrong_stop()) if self.trial.is_stop else []
         if self.held is not None:
             wrong.append(f"still held by {self.held}")
+        if self.trial.shows is not None and not (self.proof is not None and self.proof.is_so):
+            wrong.append(f"not seen in effect: {None if self.proof is None else self.proof.shown}")
         if self.trial.bars and self.barred is None:
             wrong.append("the arm could be taken while the fault lasted")
+        if self.barred is not None and self.trial.barred_by not in self.barred:
+            wrong.append(f"expected to be refused by {self.trial.barred_by!r}")
         if self.jogged_rad is not None and not 0.9 * JOG_RAD < self.jogged_rad < 1.1 * JOG_RAD:
             wrong.append(f"the jog moved {self.jogged_rad:.3f} rad")
         if not self.rearm_rad <= STILL_RAD:
@@ -52,6 +60,8 @@ class Outcome(msgspec.Struct, frozen=True, kw_only=True):
         found: dict[str, str] = {}
         if self.raised is not None:
             found["raised"] = f"{self.raised.what}: {self.raised.detail}"
+        if self.proof is not None:
+            found["shown"] = self.proof.shown
         if self.stop is not None:
             found["rest_ms"] = f"{1e3 * self.stop.rest_s:.0f} of {1e3 * self.stop.predicted_s:.0f}"
             found["speed_rad_s"] = f"{self.stop.speed_rad_s:.2f}"
@@ -65,11 +75,11 @@ class Outcome(msgspec.Struct, frozen=True, kw_only=True):
         return found
 
     def _wrong_stop(self) -> tuple[str, ...]:
-        if self.noticed_s is None or self.stop is None:
-            return ("not noticed",)
+        if self.told_s is None or self.stop is None:
+            return ("not told",)
         wrong: list[str] = []
-        if not self.noticed_s <= self.trial.noticed_s:
-            wrong.append(f"noticed after {1e3 * self.noticed_s:.0f} ms")
+        if not self.told_s <= TOLD_S:
+            wrong.append(f"told after {1e3 * self.told_s:.0f} ms")
         if not self.stop.rest_s <= self.stop.predicted_s + REST_SLACK_S:
             wrong.append(f"rest after {self.stop.rest_s:.3f} s, predicted {self.stop.predicted_s:.3f} s")
         if not max(self.stop.after_rad, self.restored_rad or 0.0) <= STILL_RAD:

@@ -10,16 +10,16 @@ from typing import Any
 import msgspec
 
 from sim_twin.broken.pendant import Pendant
+from sim_twin.broken.proof import Shows, shows_bias, shows_dh, shows_lag, shows_late, shows_noise, shows_weight
 from sim_twin.broken.rider import Rider
 from sim_twin.controller.process import ask_fault
+from sim_twin.controller.wire.wires import GRIPPER
 
-__all__ = ["JOG_RAD", "TRIALS", "Moment", "Stage", "Trial"]
+__all__ = ["JOG_RAD", "TOLD_S", "TRIALS", "Moment", "Stage", "Trial"]
 
 JOG_RAD = 0.3
-STOP_S = 0.8
-"""A station is told after it has waited until the arm's own watchdog must have stopped the arm: 0.5 s."""
-ENGAGE_S = 1.0
-"""While the client connects or disconnects no other thread of its process runs: 0.6 s."""
+TOLD_S = 0.1
+"""How soon whatever stops the arm must be told."""
 
 
 class Moment(StrEnum):
@@ -37,10 +37,13 @@ class Stage(msgspec.Struct, frozen=True, kw_only=True):
     host: str
     rider: Rider
     pendant: Pendant
+    answers: dict[str, dict[str, object]] = msgspec.field(default_factory=dict[str, dict[str, object]])
+    """What each fault said when it was brought about last."""
 
     def fault(self, name: str, **numbers: object) -> float:
         """Bring a fault about, and return when it was (s, the host's monotonic time)."""
-        return float(str(ask_fault(self.host, name, **numbers)["at_s"]))
+        answer = self.answers[name] = ask_fault(self.host, name, **numbers)
+        return float(str(answer["at_s"]))
 
 
 def _nothing(_: Stage) -> None: ...
@@ -59,18 +62,20 @@ class Trial(msgspec.Struct, frozen=True, kw_only=True):
     during: Moment = Moment.RIDE
     ends_process: bool = False
     """The stop cannot be confirmed, and the process that held the arm must end for it."""
-    noticed_s: float = 0.1
-    """How soon it must be told."""
     is_stop: bool = True
-    """It must be noticed, and the arm must come to rest; else it may be borne."""
+    """It must be told, and the arm must come to rest; else it may be borne."""
+    shows: Shows | None = None
+    """Tells off the wire that it was there, where it is borne; None where only `barred_by` can."""
     begins_s: float = 0.0
     """How long after it a stop may begin, where commands were still under way."""
     hold_s: float = 0.4
-    """How long it lasts after it was noticed."""
+    """How long it lasts after it was told."""
     is_jogged: bool = False
     """Somebody moves the joints meanwhile, at the pendant."""
     bars: bool = False
     """While it lasts nobody may take the arm."""
+    barred_by: str = ""
+    """Words that must be in what refuses it."""
     is_brief: bool = False
     """Part of the short bench."""
 
@@ -128,22 +133,25 @@ def _short_freeze(stage: Stage) -> float:
 
 
 _REGISTERS = ["input_int_register_0"]
+_BIAS_RAD = (0.02, 0.0, 0.0, 0.0, 0.0, 0.0)
 TRIALS: tuple[Trial, ...] = (
     Trial(name="link_dropped", begin=_by("drop")),
     Trial(
         name="link_cut_3s_and_jogged", begin=_cut, end=_by("refuse", on=False), hold_s=3.0, is_jogged=True, bars=True,
         is_brief=True,
     ),
-    Trial(name="cut_during_stop", begin=_by("drop"), during=Moment.STOP, noticed_s=STOP_S, hold_s=1.0),
+    Trial(name="cut_during_stop", begin=_by("drop"), during=Moment.STOP, hold_s=1.0),
     Trial(
-        name="cut_3s_during_stop", begin=_cut, end=_by("refuse", on=False), during=Moment.STOP, noticed_s=STOP_S,
+        name="cut_3s_during_stop", begin=_cut, end=_by("refuse", on=False), during=Moment.STOP,
         hold_s=3.0, bars=True,
     ),
-    Trial(name="cut_during_engage", begin=_by("drop"), during=Moment.ENGAGE, noticed_s=ENGAGE_S, hold_s=1.0),
+    Trial(name="cut_during_engage", begin=_by("drop"), during=Moment.ENGAGE, hold_s=1.0),
     Trial(name="cut_between_engage_and_seed", begin=_by("drop"), during=Moment.SEED, hold_s=1.0),
     Trial(name="rtde_dropped", begin=_by("drop", port=30004)),
     Trial(name="link_late_200ms", begin=_by("delay", ms=200), end=_by("delay", ms=0), begins_s=0.26),
-    Trial(name="link_late_20ms", begin=_by("delay", ms=20), end=_by("delay", ms=0), is_stop=False),
+    Trial(
+        name="link_late_20ms", begin=_by("delay", ms=20), end=_by("delay", ms=0), is_stop=False, shows=shows_lag(0.02)
+    ),
     Trial(
         name="interfaces_frozen_1s", begin=_by("freeze", on=True), end=_by("freeze", on=False), hold_s=1.0,
         is_brief=True,
@@ -163,27 +171,49 @@ TRIALS: tuple[Trial, ...] = (
     Trial(name="safety_violation", begin=_by("violation"), person=_restart, bars=True),
     Trial(name="controller_fault", begin=_by("fault"), person=_restart, bars=True),
     Trial(name="program_stopped", begin=_by("program_stop")),
+    Trial(name="gripper_dropped", begin=_by("drop", port=GRIPPER), begins_s=TOLD_S),
+    Trial(
+        name="gripper_silent", begin=_by("freeze", on=True, port=GRIPPER), end=_by("freeze", on=False, port=GRIPPER),
+        begins_s=TOLD_S, hold_s=1.0, bars=True, barred_by="gripper",
+    ),
     Trial(name="servo_process_hung_and_jogged", begin=_hang, hold_s=0.6, is_jogged=True, is_brief=True),
     Trial(
         name="speed_slider_lowered", begin=_by("slider", share=0.3), end=_by("slider", share=1.0), bars=True,
     ),
     Trial(name="reduced_mode", begin=_by("reduced", on=True), end=_by("reduced", on=False), bars=True),
     Trial(
-        name="remote_control_off", begin=_by("remote", on=False), end=_by("remote", on=True), is_stop=False, bars=True
+        name="remote_control_off", begin=_by("remote", on=False), end=_by("remote", on=True), is_stop=False, bars=True,
+        barred_by="remote control",
     ),
     Trial(
         name="register_in_use", begin=_by("reserve", names=_REGISTERS), end=_by("reserve"), is_stop=False, bars=True,
+        barred_by="in use",
     ),
     Trial(name="ticks_late_80ms", begin=_by("late", ms=80.0), end=_by("late"), hold_s=0.2),
-    Trial(name="ticks_late_3ms", begin=_by("late", ms=3.0, every=3), end=_by("late"), is_stop=False),
-    Trial(name="joints_noisy_1mrad", begin=_by("noise", rad=0.001), end=_by("noise"), is_stop=False),
+    Trial(
+        name="ticks_late_3ms", begin=_by("late", ms=3.0, every=3), end=_by("late"), is_stop=False,
+        shows=shows_late(0.003, every=3),
+    ),
+    Trial(
+        name="joints_noisy_1mrad", begin=_by("noise", rad=0.001), end=_by("noise"), is_stop=False,
+        shows=shows_noise(0.001),
+    ),
     Trial(name="joints_biased_300mrad", begin=_by("bias", rad=[0.3, 0, 0, 0, 0, 0]), end=_by("bias")),
-    Trial(name="joints_biased_20mrad", begin=_by("bias", rad=[0.02, 0, 0, 0, 0, 0]), end=_by("bias"), is_stop=False),
-    Trial(name="payload_3kg_too_light", begin=_by("payload", kg=3.0), end=_by("payload"), is_stop=False),
-    Trial(name="calibrated_1mm", begin=_by("calibrate", mm=1.0, mrad=1.0), end=_by("calibrate"), is_stop=False),
+    Trial(
+        name="joints_biased_20mrad", begin=_by("bias", rad=_BIAS_RAD), end=_by("bias"), is_stop=False,
+        shows=shows_bias(_BIAS_RAD),
+    ),
+    Trial(
+        name="payload_3kg_too_light", begin=_by("payload", kg=3.0), end=_by("payload"), is_stop=False,
+        shows=shows_weight(3.0),
+    ),
+    Trial(
+        name="calibrated_1mm", begin=_by("calibrate", mm=1.0, mrad=1.0), end=_by("calibrate"), is_stop=False,
+        shows=shows_dh(1.0, 1.0),
+    ),
     Trial(
         name="calibrated_80mrad", begin=_by("calibrate", mm=1.0, mrad=80.0), end=_by("calibrate"), is_stop=False,
-        bars=True,
+        bars=True, barred_by="another model", shows=shows_dh(1.0, 80.0),
     ),
 )  # fmt: skip
 """In the order in which they are run; each leaves the controller as it found it."""

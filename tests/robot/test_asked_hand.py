@@ -74,10 +74,13 @@ def test_where_a_person_sees_to_the_table_the_arm_is_let_go_of_first():
         def stop(self):
             done.append("stop")
 
+        def await_rest(self):
+            done.append("rest")
+
     class Somebody:
         def await_key(self, text):
             done.append(text)
 
     PersonLook(loop=Loop(), person=Somebody()).reset(seed=1, epoch=0, digital_out=0)
-    assert done[0] == "stop"
-    assert "disarmed" in done[1]
+    assert done[:2] == ["stop", "rest"]
+    assert "disarmed" in done[2]

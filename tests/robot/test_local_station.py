@@ -65,6 +65,29 @@ def test_a_table_that_cannot_be_seen_when_the_arm_is_taken_latches_it(fake, monk
         station.step(go())
 
 
+@pytest.mark.parametrize("moment", ["step", "reset"])
+def test_what_is_lost_is_on_the_read_out_before_the_arm_is_stopped_for_it(fake, monkeypatch, moment):
+    """A stop that is seen to its end takes longer than telling may."""
+    station, plant, _ = fake
+    shown, stop = [], station.loop.stop
+
+    def note():
+        shown.append(station.state)
+        stop()
+
+    def blind():
+        raise StaleStateError("no truth")
+
+    monkeypatch.setattr(station.loop, "stop", note)
+    monkeypatch.setattr(plant.truth, "read", blind)
+    if moment == "step":
+        assert station.step(go()).is_void
+    else:
+        with pytest.raises(StaleStateError):
+            station.reset(seed=1, epoch=1)
+    assert [(state.mode, "no truth" in state.reason) for state in shown] == [(StationMode.LATCHED, True)]
+
+
 def test_a_held_object_that_is_lost_voids_the_step_without_latching(fake):
     station, plant, _ = fake
     plant.arm.held_opening_m = 0.044

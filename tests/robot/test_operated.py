@@ -144,6 +144,10 @@ class Lossy:
         if errors:
             raise errors.pop(0)
 
+    def connect(self):
+        self._fail_at("connect")
+        self._loop.connect()
+
     def engage(self):
         self._fail_at("engage")
         self.why_lost = None
@@ -235,6 +239,29 @@ def test_an_arm_that_is_lost_again_while_it_is_armed_again_is_armed_once_more(lo
     lossy.loop.failures[moment] = [StaleStateError("no state")] * 8
     lossy.station.reset(seed=2, epoch=1)
     assert_goes_on(lossy, n_latches=8)
+
+
+@pytest.mark.parametrize("moment", ["engage", "seed"])
+def test_an_arm_that_stops_during_the_very_first_arming_has_latched_and_is_armed_again_at_the_reset(resolved, moment):
+    lossy = Lossful(resolved, build_operator(resolved.rig))
+    lossy.loop.failures[moment] = [ArmRefusedError("protective stop")]
+    with lossy.station as station:
+        assert (station.state.mode, "protective stop" in station.state.reason) == (StationMode.LATCHED, True)
+        assert lossy.local.latch_reasons == ("protective stop",)
+        station.reset(seed=1, epoch=0)
+        assert_goes_on(lossy, n_latches=1)
+
+
+def test_an_arm_that_cannot_be_reached_or_is_another_ends_the_first_arming(resolved):
+    for error in (WireError("nobody answers"), RobotConfigError("another arm")):
+        lossy = Lossful(resolved, build_operator(resolved.rig))
+        if isinstance(error, WireError):
+            lossy.loop.failures["connect"] = [error]
+        else:
+            lossy.loop.failures["engage"] = [error]
+        with pytest.raises(type(error), match=str(error)), lossy.station:
+            pass
+        assert lossy.local.n_latches == 0
 
 
 def test_a_wire_that_fails_while_latched_is_tried_again_and_its_error_ends_the_run_at_last(lossy):

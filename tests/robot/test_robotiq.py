@@ -9,6 +9,7 @@ from config.loader import load_arm
 from robot.errors import WireError
 from robot.hal import robotiq
 from robot.hal.robotiq import GripScale, RobotiqGripper
+from robot.hal.rtde_command import RATE_HZ
 from robot.messages import GripCommand
 from sim_twin.controller.wire.gripper_port import GripperMeasurement, GripperRequest, GripperServer
 from sim_twin.controller.wire.peer import Budget
@@ -260,6 +261,23 @@ def test_a_silent_gripper_and_a_closed_connection_are_errors(bench):
     bench.port.drop_peers()
     with pytest.raises(WireError, match=r"closed|got"):
         poll_on(bench.gripper)
+
+
+@pytest.mark.parametrize(("is_commanded", "limit"), [(False, robotiq.SILENT_LIMIT), (True, robotiq.WATCHED_LIMIT)])
+def test_silence_is_borne_for_so_many_polls_and_not_for_one_more(bench, is_commanded, limit):
+    bench.turn(lambda: bench.gripper.state is not None)
+    if is_commanded:
+        bench.gripper.command(grip(0.0))
+    bench.gripper.poll(is_awaited=True)  # the question that nobody answers
+    for _ in range(limit):
+        bench.gripper.poll()
+    with pytest.raises(WireError, match=f"within {limit} polls"):
+        bench.gripper.poll()
+
+
+def test_a_commanded_gripper_that_falls_silent_is_told_within_100_ms():
+    slowest_polls = robotiq.ASK_EVERY + robotiq.WATCHED_LIMIT + 1
+    assert slowest_polls / RATE_HZ < 0.1
 
 
 def test_nobody_there_is_said():

@@ -12,10 +12,11 @@ from robot.errors import NotEngagedError, RobotConfigError, SafetyError, WireErr
 from robot.local_station import LocalStation
 from robot.messages import GripCommand, Heading, JointTarget, Outcome, PlantKind, StationMode, Verdict
 from robot.rigs import build_plant
-from robot.servo_client import ServoClient
+from robot.servo_client import COAST_S, ServoClient
 from robot.servo_messages import StrideReply
 from robot.servo_process import EXIT_TERMINATED
 from robot.tick_loop import Stride
+from tests.support import unstoppable
 from tests.support.stations import fake_rig
 
 pytestmark = pytest.mark.realtime
@@ -62,6 +63,10 @@ def test_one_life_of_a_process(client):
     rested = client.seed()
     assert stride(client, go()).before.tcp_position_m == pytest.approx(rested.tcp_position_m, abs=1e-3)
     client.stop()
+    stopped_s = time.monotonic()
+    client.await_rest()
+    assert time.monotonic() - stopped_s < COAST_S / 2, "it was seen to rest"
+    assert client.why_lost is None
     with pytest.raises(SafetyError, match="engage"):
         stride(client, go())
 
@@ -194,6 +199,56 @@ def test_a_loss_is_told_after_a_stop_too_until_somebody_engages_again(client):
     assert "ended" in client.why_lost
     client.engage()
     assert client.why_lost is None
+
+
+TOLD_S = 0.1
+"""How soon a loss must be told."""
+
+
+def with_plant(plant):
+    resolved = fake_rig()
+    return ServoClient(msgspec.structs.replace(resolved, rig=msgspec.structs.replace(resolved.rig, plant=plant)))
+
+
+@pytest.fixture
+def stubborn():
+    made = with_plant(unstoppable.PLANT)
+    made.connect()
+    made.engage()
+    made.seed()
+    yield made
+    made.close()
+
+
+def kill(client):
+    os.kill(client.pid, signal.SIGKILL)
+    os.waitid(os.P_PID, client.pid, os.WEXITED | os.WNOWAIT)
+
+
+def test_a_stop_that_nobody_confirms_is_told_before_the_arm_can_rest_and_its_rest_is_waited_for(stubborn):
+    begun_s = time.monotonic()
+    stubborn.stop()
+    told_s = time.monotonic() - begun_s
+    assert "nobody confirms it" in stubborn.why_lost
+    assert told_s < TOLD_S < COAST_S
+    stubborn.await_rest()
+    assert time.monotonic() - begun_s >= COAST_S
+    rested_s = time.monotonic()
+    stubborn.stop()
+    stubborn.await_rest()
+    assert time.monotonic() - rested_s < COAST_S, "it was waited for already"
+
+
+def test_nothing_is_begun_anew_before_an_arm_that_was_lost_can_rest(client):
+    client.engage()
+    client.seed()
+    begun_s = time.monotonic()
+    kill(client)
+    client.stop()
+    assert "ended" in client.why_lost
+    assert time.monotonic() - begun_s < COAST_S
+    client.connect()
+    assert time.monotonic() - begun_s >= COAST_S
 
 
 def test_a_process_that_is_terminated_stops_its_arm_in_its_time(client):

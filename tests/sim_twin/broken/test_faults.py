@@ -51,7 +51,7 @@ def test_an_arm_under_way_comes_to_rest_and_waits_for_somebody(bench, trial):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("trial", [t for t in TRIALS if t.name not in ESSENTIAL], ids=lambda t: t.name)
-def test_every_other_fault_is_noticed_or_borne(bench, trial):
+def test_every_other_fault_is_told_or_borne(bench, trial):
     bench.run(trial)
 
 
@@ -75,7 +75,7 @@ def late():
         raised = None
 
         def failures(self):
-            return ("noticed after 150 ms",)
+            return ("told after 150 ms",)
 
         def details(self):
             return {}
@@ -104,7 +104,7 @@ BUSY, QUIET = 0.6, 0.02
 def test_what_is_not_as_asked_fails_unless_the_machine_was_overbooked_in_every_try(monkeypatch, shares, verdict, n):
     shared(monkeypatch, *shares)
     bench = JudgedCourse(Stub(late), wrong_with)
-    with pytest.raises(verdict, match=f"{TRIALS[0].name}.*noticed after 150 ms"):
+    with pytest.raises(verdict, match=f"{TRIALS[0].name}.*told after 150 ms"):
         bench.run(TRIALS[0])
     assert bench.course.n == n
     assert (bench.tried, len(bench.judged)) == ([TRIALS[0].name], verdict is pytest.fail.Exception)
