@@ -26,6 +26,8 @@ Inverse = Callable[[Vec3, Vec6], Vec6 | None]
 DAMPING = 1e-4
 ROUNDS = 4
 HALVINGS = 4
+N_REMEMBERED = 2
+"""Postures of which rooms are known: where a step began, and where it leads."""
 FAR_AHEAD_M, CORNER_M = 0.06, 0.02
 """A free tool trails its target by less; one that is held up may cut a corner, if a body is so near."""
 TOLERANCE_M = 5e-4
@@ -192,8 +194,10 @@ class Approach:
         self._stop_rad_s2 = braking.least_rad_s2
         self._at_m: Vec3 | None = None
         self._q: Vec6 | None = None
-        self._rooms_of: Vec6 | None = None
-        self._rooms_there: Rooms = (0.0, 0.0, 0.0, 0.0)
+        self._rooms_of: dict[Vec6, Rooms] = {}
+        """Of the joints asked about last, the newest last."""
+        self._room_m = 0.0
+        """The newest one's of bodies."""
         self._links_m = links_of(arm)
         self._margins = margins or Margins()
         self._near_m = clearance.most_m - self._margins.clearance_m
@@ -202,7 +206,7 @@ class Approach:
     def put(self, blocks: tuple[Block, ...]) -> None:
         """Take things to be where they are now."""
         self._clearance.put(blocks)
-        self._rooms_of = None
+        self._rooms_of.clear()
 
     def is_clear(self, now_rad: Vec6, target_rad: Vec6) -> bool:
         """Whether the way between joints keeps its margins, as far as the joints it begins at do."""
@@ -235,7 +239,7 @@ class Approach:
         """Draw a target that runs far ahead of a tool near a body to the tool's own side of it: no corner is cut."""
         now_m = self._chain.tcp(now_rad)
         is_far_ahead = math.dist(place_m, now_m) >= FAR_AHEAD_M
-        if not is_far_ahead and self._rooms_there[0] > CORNER_M:
+        if not is_far_ahead and self._room_m > CORNER_M:
             return place_m, because
         if self._clearance.gap(now_rad) > (CORNER_M if is_far_ahead else self._margins.clearance_m - TOLERANCE_M):
             return place_m, because
@@ -259,12 +263,16 @@ class Approach:
 
     def _rooms(self, q: Vec6) -> Rooms:
         """Return what is left to each margin."""
-        if q != self._rooms_of:
+        rooms = self._rooms_of.pop(q, None)
+        if rooms is None:
             elbow, wrist, shoulder_m = singular_room(self._links_m, q)
             a, b, c = self._least
             room_m = self._clearance.gap(q) - self._margins.clearance_m
-            self._rooms_of, self._rooms_there = q, (room_m, elbow - a, wrist - b, shoulder_m - c)
-        return self._rooms_there
+            rooms = room_m, elbow - a, wrist - b, shoulder_m - c
+            if len(self._rooms_of) == N_REMEMBERED:
+                del self._rooms_of[next(iter(self._rooms_of))]
+        self._rooms_of[q], self._room_m = rooms, rooms[0]
+        return rooms
 
     def _overrun_m(self, a: Vec6, b: Vec6, moved_m: float) -> float:
         """Return how much farther than motion's own braking a stop at the worst may carry the tool here.
