@@ -17,15 +17,20 @@ from config.arm import ArmConfig
 from robot.chain import ToolChain
 from robot.compiled import Table, compiled
 from robot.messages import Vec3, Vec6
+from robot.motion.pieces import Pieces, whole
 from robot.safety import Block, Braking, Clearance
 
-__all__ = ["Approach", "Margins", "Wall", "links_of", "singular_room", "yielding"]
+__all__ = ["N_PIECES", "Approach", "Margins", "Wall", "links_of", "singular_room", "yielding"]
 
 Array = NDArray[np.float64]
 Inverse = Callable[[Vec3, Vec6], Vec6 | None]
 DAMPING = 1e-4
 ROUNDS = 4
 HALVINGS = 4
+N_PIECES = 5
+"""A target that is led past bodies is found in so many at the most, each as long as a tick may spare."""
+N_REMEMBERED = 2
+"""Postures of which rooms are known: where a step began, and where it leads."""
 FAR_AHEAD_M, CORNER_M = 0.06, 0.02
 """A free tool trails its target by less; one that is held up may cut a corner, if a body is so near."""
 TOLERANCE_M = 5e-4
@@ -192,8 +197,10 @@ class Approach:
         self._stop_rad_s2 = braking.least_rad_s2
         self._at_m: Vec3 | None = None
         self._q: Vec6 | None = None
-        self._rooms_of: Vec6 | None = None
-        self._rooms_there: Rooms = (0.0, 0.0, 0.0, 0.0)
+        self._rooms_of: dict[Vec6, Rooms] = {}
+        """Of the joints asked about last, the newest last."""
+        self._room_m = 0.0
+        """The newest one's of bodies."""
         self._links_m = links_of(arm)
         self._margins = margins or Margins()
         self._near_m = clearance.most_m - self._margins.clearance_m
@@ -202,7 +209,7 @@ class Approach:
     def put(self, blocks: tuple[Block, ...]) -> None:
         """Take things to be where they are now."""
         self._clearance.put(blocks)
-        self._rooms_of = None
+        self._rooms_of.clear()
 
     def is_clear(self, now_rad: Vec6, target_rad: Vec6) -> bool:
         """Whether the way between joints keeps its margins, as far as the joints it begins at do."""
@@ -218,24 +225,34 @@ class Approach:
             now_rad: the joints commanded by now.
             joints_at: the joints that bring the tool to a place, near others.
         """
+        return whole(self.clearing(at_m, target_m, now=lambda: now_rad, joints_at=joints_at))
+
+    def clearing(
+        self, at_m: Vec3, target_m: Vec3, *, now: Callable[[], Vec6], joints_at: Inverse
+    ) -> Pieces[tuple[Vec3, str | None]]:
+        """Do the same piece by piece, N_PIECES at the most; `now` returns the joints commanded by then."""
         if target_m == at_m:
             return target_m, None
-        q_at = self._q if at_m == self._at_m else joints_at(at_m, now_rad)
+        q_at = self._q if at_m == self._at_m else joints_at(at_m, now())
         if q_at is None:
-            at_m, q_at = self._chain.tcp(now_rad), now_rad
+            q_at = now()
+            at_m = self._chain.tcp(q_at)
         q = joints_at(target_m, q_at)
         overrun_m = 0.0 if q is None else self._overrun_m(q_at, q, math.dist(at_m, target_m))
+        yield
         if q is not None and overrun_m == 0.0 and _is_far(self._rooms(q_at), self._rooms(q), self._near_m):
             place_m, because = self._take(target_m, q), None
         else:
-            place_m, because = self._yield(at_m, target_m, q_at, overrun_m, joints_at)
-        return self._uncut(place_m, because, now_rad, joints_at)
+            yield
+            place_m, because = yield from self._yield(at_m, target_m, q_at, overrun_m, joints_at)
+        yield
+        return self._uncut(place_m, because, now(), joints_at)
 
     def _uncut(self, place_m: Vec3, because: str | None, now_rad: Vec6, joints_at: Inverse) -> tuple[Vec3, str | None]:
         """Draw a target that runs far ahead of a tool near a body to the tool's own side of it: no corner is cut."""
         now_m = self._chain.tcp(now_rad)
         is_far_ahead = math.dist(place_m, now_m) >= FAR_AHEAD_M
-        if not is_far_ahead and self._rooms_there[0] > CORNER_M:
+        if not is_far_ahead and self._room_m > CORNER_M:
             return place_m, because
         if self._clearance.gap(now_rad) > (CORNER_M if is_far_ahead else self._margins.clearance_m - TOLERANCE_M):
             return place_m, because
@@ -259,12 +276,16 @@ class Approach:
 
     def _rooms(self, q: Vec6) -> Rooms:
         """Return what is left to each margin."""
-        if q != self._rooms_of:
+        rooms = self._rooms_of.pop(q, None)
+        if rooms is None:
             elbow, wrist, shoulder_m = singular_room(self._links_m, q)
             a, b, c = self._least
             room_m = self._clearance.gap(q) - self._margins.clearance_m
-            self._rooms_of, self._rooms_there = q, (room_m, elbow - a, wrist - b, shoulder_m - c)
-        return self._rooms_there
+            rooms = room_m, elbow - a, wrist - b, shoulder_m - c
+            if len(self._rooms_of) == N_REMEMBERED:
+                del self._rooms_of[next(iter(self._rooms_of))]
+        self._rooms_of[q], self._room_m = rooms, rooms[0]
+        return rooms
 
     def _overrun_m(self, a: Vec6, b: Vec6, moved_m: float) -> float:
         """Return how much farther than motion's own braking a stop at the worst may carry the tool here.
@@ -277,16 +298,16 @@ class Approach:
 
     def _yield(
         self, at_m: Vec3, target_m: Vec3, q_at: Vec6, overrun_m: float, joints_at: Inverse
-    ) -> tuple[Vec3, str | None]:
+    ) -> Pieces[tuple[Vec3, str | None]]:
         step = [b - a for a, b in zip(at_m, target_m, strict=True)]
         J = self._clearance.tool_jacobian(q_at)
         margin_m = self._margins.clearance_m + overrun_m
-        walls = [
-            Wall(w.name, w.room, _over_tool(_vec6(w.slope), J), w.share)
-            for w in (*self._bodies(q_at, margin_m, _length(step)), *self._singular(q_at))
-        ]
+        bodies = [*self._bodies(q_at, margin_m, _length(step))]
+        yield
+        walls = [Wall(w.name, w.room, _over_tool(_vec6(w.slope), J), w.share) for w in (*bodies, *self._singular(q_at))]
         walls += self._fences(at_m, overrun_m)
         left, blamed = yielding(step, walls)
+        yield
         for _ in range(HALVINGS):
             place = (at_m[0] + left[0], at_m[1] + left[1], at_m[2] + left[2])
             q = joints_at(place, q_at)

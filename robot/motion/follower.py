@@ -25,7 +25,7 @@ from robot.motion.holding import (
 from robot.motion.limiter import AxisLimits, Limiter
 from robot.motion.pacing import braked, part_way, window
 
-__all__ = ["Follower"]
+__all__ = ["SWIFT_TICK_S", "Follower"]
 
 SPEED_SHARE = 0.95
 """Share of a joint's greatest speed that motion uses, so that the gate's limit is never met by rounding."""
@@ -34,8 +34,8 @@ RATE_SHARE = 0.97
 ALIGN_RAD = 0.01
 """A tool tilted or turned by less than this points down as far as motion cares; the next ticks set it right."""
 SWIFT_TICK_S = 0.005
-"""In shorter ticks than this, a real arm's and not the twin's, the way to a new target is found one tick after it was
-set: the tick in which an intent begins has enough to do."""
+"""In shorter ticks than this, a real arm's and not the twin's, a new target is gone to one tick after it was set, and the
+mover finds it piece by piece: the tick in which an intent begins has enough to do."""
 STILL_RAD_S = 1e-3
 ALIGN_STEP_RAD = 0.35
 """Greatest change of any joint's target in one step while the tool is brought upright."""

@@ -12,6 +12,7 @@ from robot.chain import Points, ToolChain, chain_points, lowest_fingertip
 from robot.compiled import Table, compiled
 from robot.envelope import Envelope, braking_step
 from robot.fences import fence_gap, row_of
+from robot.geometry import between
 from robot.messages import Vec3, Vec6
 from robot.motion.holding import JOINT_RESERVE, MARGIN_M, SPEED_RESERVE, braked_step
 from robot.motion.pacing import RESERVE
@@ -82,20 +83,43 @@ def _are_parts_slow(before: Points, now: Points, to: Points, bounds: Table) -> b
 
 
 @compiled
-def _are_fences_far(now: Points, to: Points, fences: Table, bounds: Table, fastest: float, is_straight: bool) -> bool:
-    lost = bounds[2, 2] / fastest
+def _can_stop(now: float, to: float, end: float, bounds: Table, lost: float, onwards: float) -> bool:
+    """Return whether a gap suffices to come to rest in, as holding reckons it.
+
+    Args:
+        now: what is left of it at the last command, motion's margin taken off.
+        to: where the step leads.
+        end: where joints that brake together would come to rest.
+        bounds: free_bounds.
+        lost: share of every step that braking takes off in a tick.
+        onwards: how many steps such an arm goes.
+    """
+    size = max(now - to, (now - end) / onwards)
+    return size <= 0.0 or size <= braking_step(now, min(bounds[1, 4], lost * size), bounds[1, 5])
+
+
+@compiled
+def _are_fences_far(
+    now: Points, to: Points, end: Points, fences: Table, bounds: Table, lost: float, onwards: float
+) -> bool:
     for k in range(fences.shape[0]):
         part, row = int(fences[k, 0]), row_of(fences, k)
         left = fence_gap(row, to[part])
         if left > bounds[1, 3]:
             continue
-        if not is_straight:
-            return False
-        gap = fence_gap(row, now[part])
-        size = gap - left
-        if not size <= 0.0 and not size <= braking_step(gap - MARGIN_M, min(bounds[1, 4], lost * size), bounds[1, 5]):
+        here, rest = fence_gap(row, now[part]), fence_gap(row, end[part])
+        if not _can_stop(here - MARGIN_M, left - MARGIN_M, rest - MARGIN_M, bounds, lost, onwards):
             return False
     return True
+
+
+@compiled
+def _are_tips_high(now: Place, to: Place, end: Place, bounds: Table, lost: float, onwards: float) -> bool:
+    tip_m, finger_m, floor_m = bounds[2, 3], bounds[2, 4], bounds[2, 5] + MARGIN_M
+    here = lowest_fingertip(now[0][0], now[1], tip_m, finger_m) - floor_m
+    there = lowest_fingertip(to[0][0], to[1], tip_m, finger_m) - floor_m
+    rest = lowest_fingertip(end[0][0], end[1], tip_m, finger_m) - floor_m
+    return _can_stop(here, there, rest, bounds, lost, onwards)
 
 
 @compiled
@@ -122,15 +146,23 @@ def is_free_step(
         is_straight: the tool goes straight; joints' ways bend, and near a fence it matters where they would stop.
     """
     b = bounds
-    to, down = chain_points(steps[0], rows, (b[0, 0], b[0, 1], b[0, 2]), (b[0, 3], b[0, 4], b[0, 5]))
+    tcp_m, elbow_m = (b[0, 0], b[0, 1], b[0, 2]), (b[0, 3], b[0, 4], b[0, 5])
+    to = chain_points(steps[0], rows, tcp_m, elbow_m)
     fastest = _greatest_step(steps, joints)
     if not fastest > 0.0:
-        return False, (to, down)
+        return False, to
     is_free = (
         _are_ends_far(steps, joints, b, fastest)
-        and _are_parts_slow(before, now[0], to, b)
-        and (down >= b[2, 1] or down >= now[1])
-        and (is_straight or lowest_fingertip(to[0], down, b[2, 3], b[2, 4]) - b[2, 5] > b[1, 3])
-        and _are_fences_far(now[0], to, fences, b, fastest, is_straight)
+        and _are_parts_slow(before, now[0], to[0], b)
+        and (to[1] >= b[2, 1] or to[1] >= now[1])
     )
-    return is_free, (to, down)
+    if not is_free:
+        return False, to
+    lost, end, onwards = b[2, 2] / fastest, to, 1.0
+    if not is_straight:
+        onwards = 1.0 + b[1, 5] + 0.5 / lost
+        end = chain_points(between(steps[1], steps[0], onwards), rows, tcp_m, elbow_m)
+    is_free = (is_straight or _are_tips_high(now, to, end, b, lost, onwards)) and _are_fences_far(
+        now[0], to[0], end[0], fences, b, lost, onwards
+    )
+    return is_free, to

@@ -7,10 +7,11 @@ from config.arm import ArmConfig
 from robot.envelope import Envelope
 from robot.geometry import inside_box
 from robot.messages import ArmState, Heading, Intent, JointTarget, Limited, Twist, Vec3, Vec6
-from robot.motion.approach import Approach
+from robot.motion.approach import N_PIECES, Approach
 from robot.motion.contact import ContactGuard
-from robot.motion.follower import Follower
+from robot.motion.follower import SWIFT_TICK_S, Follower
 from robot.motion.holding import MARGIN_M, MARGIN_RAD, led_out, share_of_giving_way
+from robot.motion.pieces import Pieces, padded, whole
 from robot.motion.target import (
     MAX_TURN_RAD,
     Shaped,
@@ -25,6 +26,8 @@ from robot.safety import Block, StopCheck
 
 __all__ = ["Mover"]
 
+FOUND = True
+"""What a way that is found says."""
 JOINT_STEP_RAD = 0.35
 """Greatest change of any joint's target in one step."""
 FENCE_MARGIN_M = 1e-4
@@ -66,10 +69,17 @@ class Mover:
         self._follower = Follower(arm, envelope=envelope, tick_s=tick_s, tip_min_m=self._limits.tip_min_m)
         self._envelope = envelope
         self._contact = ContactGuard(arm)
-        self._trail = Trail(arm.servo, tick_s=tick_s, q_rad=self._follower.q_rad)
+        is_swift = tick_s < SWIFT_TICK_S
+        self._trail = Trail(
+            arm.servo, tick_s=tick_s, q_rad=self._follower.q_rad, n_ahead=N_PIECES + 1 if is_swift else 0
+        )  # fmt: skip
         self._ranges = tuple(j.range_rad for j in arm.joints)
         self._fall_back_rad = tuple(RESEAT_SHARE * j.speed_rad_s * tick_s for j in arm.joints)
         self._amounts: dict[str, float] = {}
+        self._least_s = 2 * N_PIECES * tick_s if is_swift else math.inf
+        """In time steps shorter than this the way to a target is found at once."""
+        self._way: Pieces[None] | None = None
+        """How the way to a new target is found, while it is."""
 
     @property
     def target_m(self) -> Vec3:
@@ -96,12 +106,13 @@ class Mover:
         self._follower.seed(state.q_rad)
         self._trail.seed(state.q_rad)
         self._contact.reset()
-        self._amounts = {}
+        self._amounts, self._way = {}, None
         if self._stops is not None:
             self._stops.seed()
 
     def surround(self, blocks: tuple[Block, ...]) -> None:
         """Keep the arm clear of these from now on, and come to rest where they stand in its way."""
+        self._find_out()
         if self._stops is not None:
             self._stops.put(blocks)
         approach, follower = self._approach, self._follower
@@ -115,7 +126,11 @@ class Mover:
                 follower.brake()
 
     def begin_step(self, intent: Intent, state: ArmState, *, duration_s: float) -> None:
-        """Move the target as an intent asks for one time step. The gate has admitted the intent."""
+        """Move the target as an intent asks for one time step. The gate has admitted the intent.
+
+        In ticks as short as a real arm's the way to it is found piece by piece, always in as many ticks.
+        """
+        self._find_out()
         self._amounts = {}
         self._follower.let_go()
         at, yaw = self._follower.target_m, self._follower.yaw_rad
@@ -129,21 +144,24 @@ class Mover:
             self._aim_joints(intent.q_rad, state, duration_s)
         else:
             self._follower.brake()
+        if not (self._follower.is_upright and duration_s >= self._least_s):
+            self._find_out()
 
     def wait_at(self, place_m: Vec3, state: ArmState) -> None:
         """Come to rest over a place in the plane that the tool has just passed: what the hand closes on lies there.
 
         A tool that is not upright rests where it can.
         """
-        self._amounts = {"hand": 0.0}
+        self._amounts, self._way = {"hand": 0.0}, None
         self._follower.brake()
         if self._follower.is_upright:
             shaped = Shaped((place_m[0], place_m[1], self._follower.target_m[2]))
             self._follow(shaped, self._follower.yaw_rad, state)
+            self._find_out()
 
     def hold(self, because: str) -> None:
         """Come to rest in place of what an intent asks."""
-        self._amounts = {because: 0.0}
+        self._amounts, self._way = {because: 0.0}, None
         self._follower.brake()
 
     def tick(self, state: ArmState) -> Vec6:
@@ -159,6 +177,8 @@ class Mover:
             if moved is not None:
                 self._note("contact")
                 return self._give_way(moved, state)
+        if self._way is not None and next(self._way, FOUND) is FOUND:
+            self._way = None
         before = follower.q_rad
         q = follower.step()
         if not follower.is_upright and q != before:
@@ -186,7 +206,7 @@ class Mover:
 
     def _give_way(self, target_m: Vec3, state: ArmState) -> Vec6:
         """Fall back to the measured joints and aim at a target, but never let a push carry the command past a fence."""
-        follower = self._follower
+        self._way, follower = None, self._follower
         yaw, back = follower.yaw_rad, self._back_to(state.q_rad)
         if not self._is_inside(back):
             back = self._back_inside(state)
@@ -224,21 +244,31 @@ class Mover:
         fenced = self._fenced(eased, state)
         for name in fenced.limiters:
             self._note(name, math.dist(fenced.position_m, eased))
-        place_m = self._clear(fenced.position_m, yaw_rad)
+        self._way = self._finding(fenced.position_m, yaw_rad)
+
+    def _find_out(self) -> None:
+        """Find the rest of the way to a new target at once."""
+        way, self._way = self._way, None
+        if way is not None:
+            whole(way)
+
+    def _finding(self, target_m: Vec3, yaw_rad: float) -> Pieces[None]:
+        """Find the way to a target, and go there."""
+        place_m = yield from padded(self._clearing(target_m, yaw_rad), N_PIECES)
         tilted_rad = None if self._follower.is_upright else self._follower.joint_target_rad
         if not self._follower.aim(place_m, yaw_rad):
             self._note("unreachable")
         elif tilted_rad is not None and not self._follower.is_upright:
             self._aim_clear(tilted_rad, self._follower.joint_target_rad)
 
-    def _clear(self, target_m: Vec3, yaw_rad: float) -> Vec3:
+    def _clearing(self, target_m: Vec3, yaw_rad: float) -> Pieces[Vec3]:
         """Keep the target of an upright tool from leading into bodies and singular postures."""
         follower, approach = self._follower, self._approach
         if approach is None or not follower.is_upright:
             return target_m
         at_m = follower.target_m
-        place_m, because = approach.clear_place(
-            at_m, target_m, now_rad=follower.q_rad, joints_at=lambda p, seed: follower.joints_at(p, yaw_rad, seed)
+        place_m, because = yield from approach.clearing(
+            at_m, target_m, now=lambda: follower.q_rad, joints_at=lambda p, seed: follower.joints_at(p, yaw_rad, seed)
         )
         if because is not None:
             self._note(because, math.dist(place_m, target_m))
@@ -316,7 +346,7 @@ class Mover:
         return Shaped(fenced.position_m, (name, *fenced.limiters)) if name else fenced
 
     def _leashed_to_m(self, state: ArmState) -> Vec3:
-        """Return where the leash is held: where a free tool is by now, or at the tool where something keeps it away."""
+        """Return where the leash is held: where a free tool is when it sets out, or the tool that is kept away."""
         free_m = self._follower.tcp(self._trail.q_rad)
         return free_m if math.dist(free_m, state.tcp_position_m) < STRAY_M else state.tcp_position_m
 

@@ -20,10 +20,12 @@ class Trail:
         servo: How the arm follows its set-points.
         tick_s: How long each command holds.
         q_rad: Joints at which it rests.
+        n_ahead: So many ticks later it is asked for, as far as that was commanded already.
     """
 
-    def __init__(self, servo: Servo, *, tick_s: float, q_rad: Vec6) -> None:
-        n_ticks = lag_s(lookahead_s=servo.lookahead_s, gain=servo.gain, dead_time_s=servo.dead_time_s) / tick_s
+    def __init__(self, servo: Servo, *, tick_s: float, q_rad: Vec6, n_ahead: int = 0) -> None:
+        lag = lag_s(lookahead_s=servo.lookahead_s, gain=servo.gain, dead_time_s=servo.dead_time_s)
+        n_ticks = max(0.0, lag / tick_s - n_ahead)
         self._n_before = int(n_ticks)
         self._share = n_ticks - self._n_before
         self._commands: deque[Vec6] = deque(maxlen=self._n_before + 2)
@@ -39,7 +41,7 @@ class Trail:
 
     @property
     def q_rad(self) -> Vec6:
-        """Joints of an arm that nothing holds up, at the end of the newest command's tick."""
+        """Joints of an arm that nothing holds up, at the end of the newest command's tick or so many later."""
         older, newer = self._commands[0], self._commands[1]
         a, b, c, d, e, f = (n + self._share * (o - n) for o, n in zip(older, newer, strict=True))
         return a, b, c, d, e, f

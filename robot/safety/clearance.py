@@ -16,6 +16,8 @@ __all__ = ["Clearance", "Closest"]
 
 REACH_M = 0.08
 """Farther things are not looked at: twice as far costs twice the time."""
+WORLD = 0
+"""The body of what no joint moves."""
 
 
 class Closest(msgspec.Struct, frozen=True, kw_only=True):
@@ -50,6 +52,8 @@ class Clearance:
         ends = zip(model.pair_geom1.tolist(), model.pair_geom2.tolist(), strict=True)
         self._pair_of = {frozenset(ab): pair for ab, pair in zip(ends, self._pairs, strict=True)}
         self._segment = np.zeros(6)
+        self._body_of = model.geom_bodyid.tolist()
+        self._posed_rad: Vec6 | None = None
         self._tcp = model.site("tcp").id
 
     @property
@@ -62,16 +66,15 @@ class Clearance:
         for geom, before, block in zip(self._things, self._blocks, blocks, strict=True):
             if block is not before:
                 put(self._model, geom, block)
-        self._blocks = blocks
+        self._blocks, self._posed_rad = blocks, None
 
     def gap(self, q_rad: Vec6) -> float:
         """Return the least distance beyond what each pair keeps, metres, `most_m` where everything is farther.
 
         Negative: nearer than is kept, as far as one shape is inside the other.
         """
+        self._pose(q_rad)
         model, data = self._model, self._data
-        data.qpos[:] = q_rad
-        mujoco.mj_kinematics(model, data)
         mujoco.mj_collision(model, data)
         n = data.ncon
         least = self.most_m
@@ -92,8 +95,9 @@ class Clearance:
 
     def closest(self, q_rad: Vec6, *, within_m: float) -> list[Closest]:
         """Return every pair whose gap is at most so much, and how it changes with the joints."""
-        self.gap(q_rad)
+        self._pose(q_rad)
         model, data = self._model, self._data
+        mujoco.mj_collision(model, data)
         mujoco.mj_comPos(model, data)
         found: list[Closest] = []
         seen: set[tuple[int, int]] = set()
@@ -111,13 +115,19 @@ class Clearance:
 
     def tool_jacobian(self, q_rad: Vec6) -> NDArray[np.float64]:
         """Return the tool centre point's velocity and the tool's turning for a speed of each joint.  (6,) -> (6, 6)"""
+        self._pose(q_rad)
         model, data = self._model, self._data
-        data.qpos[:] = q_rad
-        mujoco.mj_kinematics(model, data)
         mujoco.mj_comPos(model, data)
         J = np.zeros((6, 6))
         mujoco.mj_jacSite(model, data, J[:3], J[3:], self._tcp)
         return J
+
+    def _pose(self, q_rad: Vec6) -> None:
+        """Bring every shape where it is for these joints, if it is not there already."""
+        if q_rad != self._posed_rad:
+            self._data.qpos[:] = q_rad
+            mujoco.mj_kinematics(self._model, self._data)
+            self._posed_rad = q_rad
 
     def _slope(self, one: int, two: int, distance: float) -> Vec6:
         """Return the gap's slope: the speed of the second nearest point away from the first, along their segment."""
@@ -127,7 +137,9 @@ class Clearance:
         slope = np.zeros(6)
         jacobian = np.zeros((3, 6))
         for geom, point, sign in ((one, start, -1.0), (two, end, 1.0)):
-            mujoco.mj_jac(model, data, jacobian, None, point, int(model.geom_bodyid[geom]))
-            slope += sign * (away @ jacobian)
+            body = self._body_of[geom]
+            if body != WORLD:
+                mujoco.mj_jac(model, data, jacobian, None, point, body)
+                slope += sign * (away @ jacobian)
         x = slope.tolist()
         return x[0], x[1], x[2], x[3], x[4], x[5]

@@ -1,5 +1,7 @@
 """Whether the arm could be stopped after a command before it leaves its limits or comes too near to anything."""
 
+import math
+
 from config.arm import ArmConfig
 from robot.chain import ToolChain, chain_points, lowest_fingertip
 from robot.compiled import Table, compiled
@@ -22,18 +24,24 @@ OVERRUN_M = 0.003
 
 Known = tuple[float, float, float]
 """Bounds where the last command led: on the gap, and how far the tool is inside its fences, every joint its range."""
+Seen = tuple[Vec6, float]
+"""Joints at which a stop would have ended at the worst, and the gap there."""
+NOTHING_SEEN: Seen = ((0.0, 0.0, 0.0, 0.0, 0.0, 0.0), -math.inf)
 
 
 @compiled
 def _looked_ahead(
-    q_rad: Vec6, before_rad: Vec6, known: Known, far_m: Vec6, links_m: Links, law: Vec3
+    q_rad: Vec6, before_rad: Vec6, known: Known, seen: Seen, far_m: Vec6, links_m: Links, law: Vec3
 ) -> tuple[Known, bool, Vec6, bool, Vec6, float]:
     """Return what a command leads to when the arm is stopped after it.
+
+    On a way of length L with gaps of at least g and h at its ends, no gap is less than (g + h - L) / 2.
 
     Args:
         q_rad: the command.
         before_rad: the one before.
         known: what was known there.
+        seen: where a stop was looked at last.
         far_m: reaches of Sweep.
         links_m: the rest of them.
         law: a stop turns a joint on by its step times the fastest joint's step times the first; at the worst the second
@@ -54,9 +62,11 @@ def _looked_ahead(
     is_limit_near = not (fence_m > moved_m * share and range_rad > fastest * share)
     rest = stepped(q_rad, step, share)
     share = fastest * stretch * weaker + lead
-    ahead_m = moved_m * share
-    is_body_near = not room_m > ahead_m
-    return (room_m, fence_m, range_rad), is_limit_near, rest, is_body_near, stepped(q_rad, step, share), ahead_m
+    ahead_m, end = moved_m * share, stepped(q_rad, step, share)
+    end_m = seen[1] - swept_m(difference(end, seen[0]), far_m, links_m)
+    room_m = max(room_m, end_m - ahead_m)
+    is_body_near = not (room_m > ahead_m or room_m + end_m > ahead_m)
+    return (room_m, fence_m, range_rad), is_limit_near, rest, is_body_near, end, ahead_m
 
 
 @compiled
@@ -106,11 +116,11 @@ def _stayed_inside(
 
 
 class StopCheck:
-    """The stopping trajectory of every command, verified. Memory: a bound on the gap where the last command led.
+    """The stopping trajectory of every command, verified. Memory: bounds on the gap where commands and stops led.
 
     Nothing of the arm moves farther than the joints' turns times their reaches, so that a gap found at one posture is
-    a bound on the gaps near it, and most ticks need one evaluation at most. Angles and workspace are asked of where
-    the arm comes to rest, bodies of the whole way there, braking at its worst.
+    a bound on the gaps near it, and most ticks need no evaluation, the others one or two. Angles and workspace are
+    asked of where the arm comes to rest, bodies of the whole way there, braking at its worst.
     """
 
     def __init__(
@@ -147,11 +157,14 @@ class StopCheck:
         self._fence_m = 0.0
         self._range_rad = 0.0
         """and every joint so far inside its range."""
+        self._seen: Seen = NOTHING_SEEN
+        self._at: Vec6 | None = None
+        """Where the last command led that was looked at."""
 
     def put(self, blocks: tuple[Block, ...]) -> None:
         """Take things to be where they are now: what was found of gaps holds no more."""
         self._clearance.put(blocks)
-        self._room_m = 0.0
+        self._room_m, self._seen = 0.0, NOTHING_SEEN
 
     def check(self, q_rad: Vec6, before_rad: Vec6, state: ArmState) -> Refusal | None:
         """Refuse joints from which a stop would end outside the limits or pass too near to something.
@@ -162,6 +175,9 @@ class StopCheck:
             state: what the arm measured. A command that falls back towards it, as motion lets it in contact, drives
                 the arm no faster than it goes.
         """
+        if before_rad != self._at:
+            self.seed()  # commands came between that nobody asked about
+        self._at = q_rad
         refusal = self._check_step(q_rad, before_rad, before_rad)
         if refusal is not None and self._is_falling_back(q_rad, before_rad, state.q_rad):
             return self._check_step(q_rad, before_rad, stepped(q_rad, state.qd_rad_s, -self._tick_s))
@@ -175,7 +191,7 @@ class StopCheck:
         """Look at the stop of a command that is as fast as if it came from some joints in one tick."""
         sweep, known = self._sweep, (self._room_m, self._fence_m, self._range_rad)
         known, is_limit_near, rest, is_body_near, end, ahead_m = _looked_ahead(
-            q_rad, from_rad, known, sweep.far_m, sweep.links_m, self._law
+            q_rad, from_rad, known, self._seen, sweep.far_m, sweep.links_m, self._law
         )
         self._room_m, self._fence_m, self._range_rad = known
         if is_limit_near:
@@ -185,8 +201,9 @@ class StopCheck:
         if not is_body_near:
             return None
         least_m = self._clearance.gap(end)
-        self._room_m = least_m - ahead_m
-        if self._room_m > 0.0:
+        self._seen = end, least_m
+        self._room_m = max(self._room_m, least_m - ahead_m)
+        if self._room_m + least_m > ahead_m:
             return None
         return self._check_way(q_rad, end, least_m, ahead_m, before_rad)
 

@@ -98,6 +98,27 @@ def test_a_tool_on_its_way_over_the_table_is_nearly_always_free():
     assert n_free >= 0.8 * n_moved
 
 
+def test_joints_on_their_way_near_a_fence_and_low_over_the_table_are_nearly_always_free():
+    held = envelope(0.01)
+    start = KINEMATICS.solve((0.42, 0.05, 0.04), ARM.home_rad)
+    gap_of = plane_gap("wall", 0, (0.0, 1.0, 0.0), 0.0)
+    held = replace(held, fences=(*held.fences, gap_of))
+    follower = Follower(ARM, envelope=held, tick_s=0.01, tip_min_m=TIP_MIN_M)
+    follower.seed(start)
+    follower.aim_joints(vec(q + d for q, d in zip(start, (0.05, 0.05, -0.05, 0.1, 0.2, 0.1), strict=True)))
+    bounds, trail, n_free, n_near = free_bounds(held, CHAIN, tip_min_m=TIP_MIN_M), [start] * 3, 0, 0
+    for _ in range(40):
+        trail.append(follower.step())
+        earlier, before, now, wanted = trail[-4:]
+        places = (CHAIN.points(before)[0], CHAIN.points(now))
+        n_free += is_free_step(
+            (wanted, now, before, earlier), *places, CHAIN.rows, bounds, held.joint_rows, held.fence_rows, False
+        )[0]
+        n_near += now != wanted and gap_of.gap(CHAIN.tcp(now)) < held.fence_far_m
+    assert n_near > 12
+    assert n_free >= 0.8 * n_near
+
+
 def test_an_arm_that_holds_still_and_what_is_not_a_number_are_not_free():
     held, home = envelope(0.01), ARM.home_rad
     bounds, place = free_bounds(held, CHAIN, tip_min_m=TIP_MIN_M), CHAIN.points(ARM.home_rad)

@@ -7,6 +7,7 @@ from config.loader import load_arm
 from robot.kinematics import Kinematics
 from robot.messages import Heading, Hold, JointTarget, Twist
 from robot.motion import Mover
+from robot.motion.approach import N_PIECES
 from robot.servo import lag_s
 from tests.support.profiles import envelope
 from tests.support.stations import arm_state
@@ -268,6 +269,51 @@ def test_a_tool_that_is_kept_far_from_where_its_commands_lead_is_leashed_where_i
     mover = Mover(ARM, envelope=envelope(tick_s), table_m=0.0, tick_s=tick_s)
     mover.seed(arm_state(Q_START, tcp_m=START))
     there = (START[0] + 0.01, START[1] - 0.08, START[2])
-    mover.begin_step(go(angle=math.pi / 2), arm_state(KINEMATICS.solve(there, Q_START), tcp_m=there), duration_s=0.05)
+    state = arm_state(KINEMATICS.solve(there, Q_START), tcp_m=there)
+    mover.begin_step(go(angle=math.pi / 2), state, duration_s=0.05)
+    for _ in range(6):
+        mover.tick(state)
     assert "leash" in mover.limiters
     assert math.dist(mover.target_m, there) == pytest.approx(LEASH_M, abs=1e-9)
+
+
+def test_at_a_real_arms_ticks_a_way_is_found_piece_by_piece_and_is_the_same_always_as_many_ticks_later():
+    made = [Mover(ARM, envelope=envelope(FAST_DT), table_m=0.0, tick_s=FAST_DT) for _ in range(2)]
+    made[0]._least_s = math.inf
+    paths, state = ([], []), arm_state(Q_START, tcp_m=START)
+    for mover in made:
+        mover.seed(state)
+    for angle in (1.0, 1.5, 4.0, 2.0, 2.5):
+        for mover, path in zip(made, paths, strict=True):
+            mover.begin_step(go(angle=angle, distance=0.005), state, duration_s=0.05)
+            path += [mover.tick(state) for _ in range(25)]
+    assert paths[1] == paths[0][:1] * N_PIECES + paths[0][:-N_PIECES]
+    assert math.dist(KINEMATICS.tcp(paths[0][-1]), START) > 1e-3
+
+
+@pytest.mark.parametrize("n_ticks", [1, 3])
+def test_intents_that_come_before_a_way_is_found_do_not_put_it_off_for_good(n_ticks):
+    mover, state = Mover(ARM, envelope=envelope(FAST_DT), table_m=0.0, tick_s=FAST_DT), arm_state(Q_START, tcp_m=START)
+    mover.seed(state)
+    for _ in range(60 // n_ticks):
+        mover.begin_step(go(angle=1.0, distance=0.002), state, duration_s=0.05)
+        for _ in range(n_ticks):
+            q = mover.tick(state)
+    assert math.dist(KINEMATICS.tcp(q), START) > 2e-3
+
+
+def test_a_hold_and_what_gives_way_to_a_push_forget_a_way_that_is_being_found():
+    pushed = arm_state(Q_START, tcp_m=START, force_n=(0.0, 0.0, 2 * CONTACT))
+    for stop in (lambda m: m.hold("no_intent"), lambda m: m.tick(pushed), lambda m: m.seed(arm_state(Q_START))):
+        mover, state = (
+            Mover(ARM, envelope=envelope(FAST_DT), table_m=0.0, tick_s=FAST_DT),
+            arm_state(Q_START, tcp_m=START),
+        )
+        mover.seed(state)
+        mover.begin_step(go(angle=1.0, distance=0.02), state, duration_s=0.05)
+        mover.tick(state)
+        stop(mover)
+        target_m = mover.target_m
+        for _ in range(10):
+            mover.tick(state)
+        assert mover.target_m == target_m

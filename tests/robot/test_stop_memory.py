@@ -1,5 +1,6 @@
 """What a stop check remembers spares it work and changes no verdict: a fresh one at every tick says the same."""
 
+import numpy as np
 import pytest
 from msgspec.structs import replace
 
@@ -114,3 +115,69 @@ def test_a_body_between_two_clear_ends_is_found_whichever_joint_turns(i):
     braking = Braking(deceleration_rad_s2=16.0, least_share=0.5)
     check = StopCheck(ARM, Thin(9.0), limits=OPEN, tick_s=TICK_S, braking=braking)
     assert check.check(turned(0.01, i), START, STATE) is not None
+
+
+class Wall(Bodies):
+    """Comes nearer by all that a turn of the base can bring anything: the bound that is reckoned with is met."""
+
+    reach_m = Sweep(ARM).bound_m((1.0, 0.0, 0.0, 0.0, 0.0, 0.0))
+
+    def __init__(self, wall_rad):
+        super().__init__(wall_rad)
+        self.n_asked = 0
+
+    def gap(self, q_rad):
+        self.n_asked += 1
+        return min(self.most_m, self.reach_m * (self._wall_rad - abs(q_rad[0] - START[0])))
+
+
+def walled(wall_rad):
+    braking = Braking(deceleration_rad_s2=16.0, least_share=0.5)
+    bodies = Wall(wall_rad)
+    return StopCheck(ARM, bodies, limits=OPEN, tick_s=TICK_S, braking=braking), bodies
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_between_walls_that_come_as_near_as_they_can_a_fresh_check_says_the_same_at_every_tick(seed):
+    rng, q, step, n_refused = np.random.default_rng(seed), START, 0.0, 0
+    kept, _ = walled(0.03)
+    for _ in range(100):
+        step = float(np.clip(step + rng.normal() * 2e-3, -9e-3, 9e-3))
+        now = (q[0] + step, *q[1:])
+        refusal, fresh = (check.check(now, q, STATE) for check in (kept, walled(0.03)[0]))
+        assert (refusal and refusal.reason) == (fresh and fresh.reason)
+        n_refused += refusal is not None
+        if refusal is None:
+            q = now
+        else:
+            step, kept = 0.0, walled(0.03)[0]  # a refusal latches, and whatever comes next begins anew
+    assert n_refused
+
+
+def test_beside_a_wall_at_little_more_than_its_stop_an_arm_looks_at_every_other_tick_at_most():
+    """A gap found at the end of one stop bounds those of the next, and with what is left here that suffices."""
+    step, n_ticks = 5e-3, 40
+    check, bodies = walled(9.0)
+    far_m = Wall.reach_m * step * (1.0 + step / (2.0 * 8.0 * TICK_S**2))
+    bodies.most_m = 1.05 * far_m
+    for k in range(1, n_ticks + 1):
+        assert check.check(turned(step * k), turned(step * (k - 1)), STATE) is None
+    assert 1 <= bodies.n_asked <= n_ticks // 2
+
+
+def test_what_was_seen_of_a_stop_counts_no_more_once_a_thing_is_put_elsewhere():
+    step = 2e-3
+    check, bodies = walled(9.0)
+    bodies.put = lambda blocks: None
+    assert check.check(turned(step), START, STATE) is None
+    bodies._wall_rad = 0.001
+    check.put(())
+    assert check.check(turned(2 * step), turned(step), STATE) is not None
+
+
+def test_what_was_known_counts_no_more_after_commands_that_were_not_asked_about():
+    kept, q, now = made(OPEN, 0.15), turned(0.14995), turned(0.15005)
+    assert kept.check(turned(1e-4), START, STATE) is None
+    refusal, fresh = (check.check(now, q, STATE) for check in (kept, made(OPEN, 0.15)))
+    assert refusal is not None
+    assert fresh is not None
