@@ -50,6 +50,7 @@ def check_limits_fit(limits: LimitsFile, arm: ArmConfig, scenario: Scenario, fil
         _check_room(profile, arm, scenario, where, checker)
         _check_grip(profile, arm, where, checker)
         _check_stopping(profile, arm, where, checker)
+        _check_contacts(profile, arm, where, checker)
 
 
 def _check_home(profile: Profile, arm: ArmConfig, where: str, checker: Checker) -> None:
@@ -124,6 +125,16 @@ def _check_stopping(profile: Profile, arm: ArmConfig, where: str, checker: Check
         allowed = getattr(profile.stopping, key)
         expected = f"at least {needed:.3f}, what motion takes from {speed:g} m/s, or a slower speeds.tcp_m_s"
         checker.need(allowed >= needed, f"{where}.stopping.{key}", expected, f"{allowed:g}")
+
+
+def _check_contacts(profile: Profile, arm: ArmConfig, where: str, checker: Checker) -> None:
+    """Check that no pair promises more than the tool's own limits hold, for nothing else holds a pair."""
+    blow_n, speed = min(profile.contact_force.blow_n, arm.motion.impact_limit_n), profile.speeds.tcp_m_s
+    for i, pair in enumerate(profile.contacts):
+        at, what = f"{where}.contacts[{i}]", "that hold every pair; lower those"
+        hard, fast = f"at least {blow_n:g}, the newtons of a blow", f"at least {speed:g}, the tool's m/s"
+        checker.need(pair.force_n >= blow_n, f"{at}.force_n", f"{hard} {what}", f"{pair.force_n:g}")
+        checker.need(pair.speed_m_s >= speed, f"{at}.speed_m_s", f"{fast} {what}", f"{pair.speed_m_s:g}")
 
 
 def gap_m(fence: Fence | Plane | KeepOut, point_m: Point) -> float:

@@ -32,6 +32,9 @@ GIVE_RAD = 0.003
 """A joint that brakes at its end swings past by so much."""
 BOW_M = 0.002
 """The tool brakes at 3 m/s² on a servo of 38 rad/s and up: it swings past by at most 3 / 38² m."""
+ASKED_M = 0.0012
+"""Set-points of a tool that goes straight bow by a millimetre between its targets; distances are told to 0.1 mm and
+joints to what they are asked with."""
 END_STOP_M = 0.002
 N_LENGTHENED = 3
 DROOP_M_PER_KG = 0.0025
@@ -64,6 +67,8 @@ def allowances_for(profile: Profile, by: Perturbation) -> Allowances:
         ("scene_clearance", profile.clearances.scene_m),
     ):
         shares[name] = off_m / max(least_m, off_m)
+        asked_m = ASKED_M + N_LENGTHENED * by.kinematics_m
+        shares[f"command_{name}"] = asked_m / max(least_m, asked_m)
     shares["meeting_speed"] = OVERSHOOT
     shares["joint_acceleration"] = OVERSHOOT
     narrowest = min(j.range_rad[1] - j.range_rad[0] for j in profile.joints) / 2.0

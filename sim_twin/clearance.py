@@ -1,5 +1,6 @@
 """Least distances between bodies over a whole course, by the physics' own geometry: spheres first, then exactly."""
 
+import math
 from collections.abc import Iterable
 
 import msgspec
@@ -8,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim_twin.plant import TwinWorld
-from sim_twin.recorder import OWN, Course, PartKind, part_kinds
+from sim_twin.readings import Reading
+from sim_twin.recorder import OWN, Course, PartKind, Placed, part_kinds
 
 __all__ = ["Clearances", "Nearest", "own_pairs", "scene_pairs"]
 
@@ -65,11 +67,30 @@ class Clearances:
         self._other_radius = model.geom_rbound[second]
         self._is_plane = model.geom_type[second] == _PLANE
 
-    def nearest(self, course: Course) -> Nearest:
-        """Return where any of the pairs came nearest."""
-        if not len(self._pairs) or not len(course.placed_m):
+    def reading(self, limit: str, course: Course, placed: Placed, least_m: float, *, spare_m: Array) -> Reading:
+        """Return the margin of the nearest pair to the least distance, as a share of that.
+
+        Args:
+            limit: what the reading is called.
+            course: for its times.
+            placed: where shapes are, tick by tick.
+            least_m: what is to be kept.
+            spare_m: (ticks,) added to all distances of a tick: what is no fault there.
+        """
+        near = self.nearest(placed, spare_m)
+        if least_m <= 0.0:
+            return Reading(limit=limit, share=math.inf if near.distance_m > 0.0 else -1.0, value=near.distance_m)
+        names = [self._model.body(int(self._model.geom_bodyid[g])).name for g in near.geoms if g >= 0]
+        return Reading(
+            limit=limit, share=min(near.distance_m, FARTHEST_M) / least_m - 1.0, value=near.distance_m,
+            at_s=near.tick * course.physics_s * course.n_substeps, detail=" to ".join(names),
+        )  # fmt: skip
+
+    def nearest(self, placed: Placed, spare_m: Array) -> Nearest:
+        """Return where any of the pairs came nearest, each tick's distances longer by what is spared there."""
+        if not len(self._pairs) or not len(placed.at_m):
             return Nearest(distance_m=FARTHEST_M)
-        bound = self._lower_bounds(course)
+        bound = self._lower_bounds(placed) + spare_m[:, None]
         best = Nearest(distance_m=FARTHEST_M)
         order = np.argsort(bound, axis=None)
         n_pairs = len(self._pairs)
@@ -78,24 +99,25 @@ class Clearances:
             if bound[tick, pair] >= best.distance_m:
                 break
             a, b = self._pairs[pair].tolist()
-            distance = self._exact(course, tick, a, b, best.distance_m)
+            spare = float(spare_m[tick])
+            distance = self._exact(placed, tick, a, b, best.distance_m - spare) + spare
             if distance < best.distance_m:
                 best = Nearest(distance_m=distance, tick=tick, geoms=(a, b))
         return best
 
-    def _lower_bounds(self, course: Course) -> Array:
+    def _lower_bounds(self, placed: Placed) -> Array:
         """Return a distance that each pair has at least, from segments and balls around them.  () -> (ticks, pairs)"""
         first, second = self._pairs[:, 0], self._pairs[:, 1]
-        centre, other = course.placed_m[:, first], course.placed_m[:, second]
-        axis = course.turned[:, first][..., 2::3]  # third column: along a capsule
+        centre, other = placed.at_m[:, first], placed.at_m[:, second]
+        axis = placed.turned[:, first][..., 2::3]  # third column: along a capsule
         apart = other - centre
         along = np.clip(np.einsum("tpi,tpi->tp", apart, axis), -self._half, self._half)
         ball = np.linalg.norm(apart - along[..., None] * axis, axis=2) - self._other_radius
         lowest = centre[..., 2] - self._half * np.abs(axis[..., 2]) - other[..., 2]
         return np.where(self._is_plane, lowest, ball) - self._radius
 
-    def _exact(self, course: Course, tick: int, a: int, b: int, most_m: float) -> float:
+    def _exact(self, placed: Placed, tick: int, a: int, b: int, most_m: float) -> float:
         data = self._scratch
-        data.geom_xpos[a], data.geom_xpos[b] = course.placed_m[tick, a], course.placed_m[tick, b]
-        data.geom_xmat[a], data.geom_xmat[b] = course.turned[tick, a], course.turned[tick, b]
+        data.geom_xpos[a], data.geom_xpos[b] = placed.at_m[tick, a], placed.at_m[tick, b]
+        data.geom_xmat[a], data.geom_xmat[b] = placed.turned[tick, a], placed.turned[tick, b]
         return float(mujoco.mj_geomDistance(self._model, data, a, b, max(most_m, 1e-3), None))

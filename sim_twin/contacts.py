@@ -3,11 +3,14 @@
 import itertools
 from collections.abc import Iterator
 
+import numpy as np
+from numpy.typing import NDArray
+
 from config.limits import AllowedContact, Profile, Touched
 from sim_twin.readings import Reading
 from sim_twin.recorder import Course, PartKind, Touch
 
-__all__ = ["allowed_pairs", "contact_readings"]
+__all__ = ["allowed_pairs", "contact_readings", "pressing_n"]
 
 _THINGS = {
     Touched.OBJECT: (PartKind.OBJECT,),
@@ -44,6 +47,17 @@ def contact_readings(course: Course, profile: Profile) -> Iterator[Reading]:
     yield from _whole(course, profile)
 
 
+def pressing_n(course: Course) -> NDArray[np.float64]:
+    """Return the force on the whole arm, friction with it: what presses on it from all sides or pushes it one way.
+
+    The greater of the two: a squeeze moves nothing, and what rubs along presses little.  () -> (steps,)
+    """
+    by_step = np.zeros((course.n_steps, 4))
+    for touch in course.touches:
+        by_step[touch.step] += (touch.force_n, *touch.vector_n)
+    return np.maximum(by_step[:, 0], np.linalg.norm(by_step[:, 1:], axis=1))
+
+
 def _pairs(course: Course, allowed: dict[tuple[PartKind, PartKind], AllowedContact]) -> Reading:
     """Read whether anything touched that may not: 0 where nothing did, else minus the force in hundreds of newtons."""
     wrong = [t for t in course.touches if (t.own, t.other) not in allowed]
@@ -76,10 +90,9 @@ def _whole(course: Course, profile: Profile) -> Iterator[Reading]:
     """Read the force on the whole arm: the greatest mean over one tick, and the greatest that outlasts one."""
     if not course.touches:
         return
-    n_ticks = -(-course.n_steps // course.n_substeps)
-    by_tick = [0.0] * n_ticks
-    for touch in course.touches:
-        by_tick[touch.step // course.n_substeps] += touch.force_n / course.n_substeps
+    whole = pressing_n(course)
+    n_ticks, n = -(-course.n_steps // course.n_substeps), course.n_substeps
+    by_tick = (np.pad(whole, (0, n_ticks * n - len(whole))).reshape(n_ticks, n).sum(axis=1) / n).tolist()
     force, tick_s = profile.contact_force, course.physics_s * course.n_substeps
     blow = max(range(n_ticks), key=by_tick.__getitem__)
     yield Reading(limit="blow", share=1.0 - by_tick[blow] / force.blow_n, value=by_tick[blow], at_s=blow * tick_s)

@@ -8,19 +8,18 @@ Every limit gets a reading: the least margin over the course as a share of the l
 What a reading may fall below zero by is the plant's part of the story and is in `Allowances`, with its reason.
 """
 
-import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from config.limits import ArmPart, KeepOut, Plane, Profile
-from sim_twin.allowances import Allowances
-from sim_twin.clearance import FARTHEST_M, Clearances, Nearest, own_pairs, scene_pairs
-from sim_twin.contacts import allowed_pairs, contact_readings
+from config.limits import ArmPart, GripLimits, JointLimit, KeepOut, Plane, Profile
+from sim_twin.allowances import DROOP_M_PER_KG, Allowances
+from sim_twin.clearance import Clearances, own_pairs, scene_pairs
+from sim_twin.contacts import allowed_pairs, contact_readings, pressing_n
 from sim_twin.plant import TwinWorld
-from sim_twin.points import Points
+from sim_twin.postures import Posed, Postures
 from sim_twin.readings import Margin, Reading
 from sim_twin.recorder import Course, PartKind
 from sim_twin.scales import keep_out_scale_m, plane_scale_m
@@ -34,6 +33,10 @@ CALM_S = 0.15
 REST_M_S = 0.005
 """Fingers that were stopped while they pressed creep over what they stand on at a few millimetres a second."""
 RINGING_S = 0.1
+SOFT_SHARE = 0.1
+"""Share of its greatest speed that a joint in its soft margin has left towards its very end."""
+BEND_M_PER_N = DROOP_M_PER_KG / 9.81
+"""What presses on the tool bends the arm about its servos' stiffness, as a load does."""
 HARD_N = 60.0
 """A hand that holds something light presses on it with less."""
 
@@ -43,7 +46,7 @@ class Monitor:
 
     def __init__(self, world: TwinWorld, profile: Profile, allowances: Allowances) -> None:
         self._profile, self._allow, self._world = profile, allowances, world
-        self._pointed = Points(world)
+        self._postures = Postures(world)
         self._own = Clearances(world, own_pairs(world))
         self._scene = Clearances(world, scene_pairs(world, allowed_pairs(profile)))
 
@@ -58,19 +61,28 @@ class Monitor:
 
     def margins(self, course: Course) -> Iterator[Margin]:
         """Return the margin of each limit that has one at every instant, as shares over the course."""
+        yield from self._margins(course, self._postures.along(course))
+
+    def _margins(self, course: Course, posed: Posed) -> Iterator[Margin]:
         yield from self._joints(course)
-        yield from self._set_points(course)
+        yield from self._set_points(course, posed)
         yield from self._speeds(course)
         yield from self._space(course)
         yield from self._grip(course)
 
     def _readings(self, course: Course) -> Iterator[Reading]:
-        yield from (margin.worst() for margin in self.margins(course))
+        posed = self._postures.along(course)
+        yield from (margin.worst() for margin in self._margins(course, posed))
         yield from contact_readings(course, self._profile)
         yield from _stops(course, self._profile)
-        clearances, dt = self._profile.clearances, course.physics_s * course.n_substeps
-        yield self._clearance("self_clearance", self._own.nearest(course), clearances.self_m, dt)
-        yield self._clearance("scene_clearance", self._scene.nearest(course), clearances.scene_m, dt)
+        clearances, n = self._profile.clearances, course.n_substeps
+        bend_m = BEND_M_PER_N * pressing_n(course)[n - 1 :: n]
+        unasked_m = np.where(_near(course, course.stopping)[n - 1 :: n], np.inf, 0.0)
+        for name, of, least_m in (
+            ("self_clearance", self._own, clearances.self_m), ("scene_clearance", self._scene, clearances.scene_m)
+        ):  # fmt: skip
+            yield of.reading(name, course, course.placed, least_m, spare_m=bend_m)
+            yield of.reading(f"command_{name}", course, posed.placed, least_m, spare_m=unasked_m)
 
     def _joints(self, course: Course) -> Iterator[Margin]:
         joints = self._profile.joints
@@ -88,7 +100,7 @@ class Monitor:
             )
             yield Margin("joint_acceleration", 1.0 - rate / most, rate, course.physics_s)
 
-    def _set_points(self, course: Course) -> Iterator[Margin]:
+    def _set_points(self, course: Course, posed: Posed) -> Iterator[Margin]:
         """Read what reached the drives: its differences over ticks, exact where the joints themselves lag and swing.
 
         While the plant stops by itself, is laid out anew, or is in contact, where a set-point falls back to the arm,
@@ -112,7 +124,10 @@ class Monitor:
                 continue
             judged = np.where(odd[len(odd) - len(came) :, None], 0.0, came)
             yield Margin(name, 1.0 - judged / most, judged, tick_s)
-        moved = self._pointed.speeds(course.set_point_rad, tick_s)
+        toward, most = _towards_ends(course.set_point_rad, joints)
+        judged = np.where(odd[len(odd) - len(toward) :, None], 0.0, toward / tick_s)
+        yield Margin("command_soft_margin", 1.0 - judged / most, judged, tick_s)
+        moved = posed.speeds(tick_s)
         moved = np.where(odd[len(odd) - len(moved) :, None], 0.0, moved)
         for i, (name, most) in enumerate(_point_speeds(self._profile)):
             yield Margin(f"command_{name}_speed", 1.0 - moved[:, i] / most, moved[:, i], tick_s)
@@ -143,6 +158,7 @@ class Monitor:
         speed = _finger_speeds(course)
         if len(speed):
             yield Margin("grip_speed", 1.0 - speed / grip.speed_m_s[1], speed, course.physics_s)
+        yield from _asked_of_hand(course, grip)
         low, high = grip.opening_m
         half = (high - low) / 2.0
         yield Margin(
@@ -150,16 +166,6 @@ class Monitor:
             1.0 - np.abs(course.opening_m - (low + high) / 2.0) / half,
             course.opening_m,
             course.physics_s,
-        )
-
-    def _clearance(self, name: str, near: Nearest, least_m: float, tick_s: float) -> Reading:
-        if least_m <= 0.0:
-            return Reading(limit=name, share=math.inf if near.distance_m > 0.0 else -1.0, value=near.distance_m)
-        share = min(near.distance_m, FARTHEST_M) / least_m - 1.0
-        model = self._world.model
-        parts = [model.body(int(model.geom_bodyid[g])).name for g in near.geoms if g >= 0]
-        return Reading(
-            limit=name, share=share, value=near.distance_m, at_s=near.tick * tick_s, detail=" to ".join(parts)
         )
 
 
@@ -248,6 +254,29 @@ def _pressed(course: Course) -> NDArray[np.bool_]:
     pressed = np.zeros(course.n_steps, dtype=bool)
     pressed[[t.step for t in course.touches if t.other is not PartKind.OBJECT or t.force_n > HARD_N]] = True
     return pressed
+
+
+def _towards_ends(set_point_rad: Array, joints: Sequence[JointLimit]) -> tuple[Array, Array]:
+    """Return steps towards an end where they lead into its soft margin, 0 elsewhere, and what speeds may be there.
+
+    In a margin as wide as m, a gap g before the end, a joint may go at S + (1 - S) g / m of its greatest speed, with S
+    the share that is left at the end itself.  (n, 6) -> (n-1, 6), (n-1, 6)
+    """
+    step, at = np.diff(set_point_rad, axis=0), set_point_rad[1:]
+    low, high = (np.array([j.range_rad[i] for j in joints]) for i in (0, 1))
+    wide, speed = np.array([j.soft_margin_rad for j in joints]), np.array([j.speed_rad_s for j in joints])
+    gap = np.where(step > 0.0, high - at, at - low)
+    left = np.clip(gap / np.maximum(wide, 1e-12), 0.0, 1.0)
+    return np.where(gap < wide, np.abs(step), 0.0), speed * (SOFT_SHARE + (1.0 - SOFT_SHARE) * left)
+
+
+def _asked_of_hand(course: Course, grip: GripLimits) -> Iterator[Margin]:
+    """Read what reached the hand's drive, against both ends of what it may be asked for: exact, like set-points."""
+    tick_s = course.physics_s * course.n_substeps
+    for i, (name, (low, high)) in enumerate((("force", grip.force_n), ("speed", grip.speed_m_s)), start=1):
+        asked = course.hand_asked[:, i]
+        share = np.minimum(1.0 - asked / high, asked / low - 1.0)
+        yield Margin(f"command_grip_{name}", np.where(np.isnan(asked), 1.0, share), np.nan_to_num(asked), tick_s)
 
 
 def _finger_speeds(course: Course) -> Array:

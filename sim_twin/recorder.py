@@ -16,11 +16,12 @@ from sim_twin.names import on_table
 from sim_twin.plant import TwinWorld
 from sim_twin.points import elbow_offset
 
-__all__ = ["Course", "PartKind", "Recorder", "Touch", "part_kinds"]
+__all__ = ["OWN", "Course", "PartKind", "Placed", "Recorder", "Touch", "part_kinds"]
 
 Array = NDArray[np.float64]
 N_JOINTS = 6
 ALL_OF = 1.0 - 1e-9
+TINY_M = 1e-9
 POINTS = ("tcp", "flange", "elbow")
 
 
@@ -50,10 +51,21 @@ class Touch(msgspec.Struct, frozen=True):
     other_name: str
     force_n: float
     """Sum of the normal forces of all contacts between the arm's part and the other body."""
+    vector_n: tuple[float, float, float]
+    """What they come to together with friction, on the arm's part, base frame."""
+
+
+class Placed(msgspec.Struct, frozen=True, kw_only=True):
+    """Where shapes are at every tick."""
+
+    at_m: Array
+    """(ticks, geoms, 3) centres"""
+    turned: Array
+    """(ticks, geoms, 9) frames"""
 
 
 class Course(msgspec.Struct, frozen=True, kw_only=True):
-    """One stream's truth; the first axis of every array is physics steps, of `placed` and `turned` ticks."""
+    """One stream's truth; the first axis of every array is physics steps, or ticks where that is said."""
 
     physics_s: float
     n_substeps: int
@@ -69,16 +81,16 @@ class Course(msgspec.Struct, frozen=True, kw_only=True):
     """(n,) distance between the pads"""
     grip_force_n: Array
     """(n,) what the hand's drive presses with"""
+    hand_asked: Array
+    """(ticks, 3) opening, greatest force and speed that reached the hand's drive; a speed of NaN where it rests"""
     position_m: Array
     """(n, 3, 3) of tcp, flange and elbow, base frame"""
     speed_m_s: Array
     """(n, 3) of tcp, flange and elbow"""
     approach: Array
     """(n, 3) the tool's approach axis, base frame"""
-    placed_m: Array
-    """(ticks, geoms, 3) centres of all geoms"""
-    turned: Array
-    """(ticks, geoms, 9) their frames"""
+    placed: Placed
+    """All geoms"""
     touches: tuple[Touch, ...]
     stopping: NDArray[np.bool_]
     """(n,) the plant's own stop was running"""
@@ -122,6 +134,7 @@ class Recorder:
         self._most_nm = model.actuator_forcerange[world.joint_controls, 1] * ALL_OF
         self._fingers = np.empty((n, 2))
         self._grip = np.empty(n)
+        self._hand_asked = np.empty((most_ticks, 3))
         self._points, self._approach = np.empty((n, 3, 3)), np.empty((n, 3))
         self._twists, self._centre = np.empty((n, 2, 6)), np.empty((n, 3))
         self._stopping = np.empty(n, dtype=bool)
@@ -167,13 +180,14 @@ class Recorder:
             q_rad=self._q[:n], qd_rad_s=self._qd[:n], set_point_rad=self._set_points[:ticks],
             at_torque=self._at_torque[:n],
             opening_m=self._fingers[:n].sum(axis=1),
-            grip_force_n=np.abs(self._grip[:n]),
+            grip_force_n=np.abs(self._grip[:n]), hand_asked=self._hand_asked[:ticks],
             position_m=points, speed_m_s=_speeds(points, self._twists[:n], self._centre[:n]),
-            approach=self._approach[:n], placed_m=self._placed[:ticks], turned=self._turned[:ticks],
+            approach=self._approach[:n], placed=Placed(at_m=self._placed[:ticks], turned=self._turned[:ticks]),
             touches=tuple(self._touches), stopping=self._stopping[:n],
         )  # fmt: skip
 
     def _step(self, model: mujoco.MjModel, data: mujoco.MjData, nstep: int) -> None:
+        self._copy_asked(model)
         for _ in range(nstep):
             mujoco.mj_step(model, data)
             self._copy(data)
@@ -197,21 +211,29 @@ class Recorder:
         self._twists[k, 0], self._twists[k, 1], self._centre[k] = self._tool_twist, self._elbow_twist, self._com
         self._stopping[k] = self._world.stop_speed_rad_s is not None
 
+    def _copy_asked(self, model: mujoco.MjModel) -> None:
+        world, asked = self._world, self._hand_asked[self._n_ticks]
+        is_at_rest = abs(world.opening_asked_m - world.opening_goal_m) < TINY_M
+        asked[0], asked[1] = world.opening_asked_m, model.actuator_forcerange[world.grip_control, 1]
+        asked[2] = np.nan if is_at_rest else world.grip_speed_m_s
+
     def _note_touches(self, model: mujoco.MjModel, data: mujoco.MjData) -> None:
         pairs = data.contact.geom
         own = self._is_own[pairs]
         mixed = own.any(axis=1)
         if not mixed.any():
             return
-        pressed: dict[tuple[PartKind, PartKind, str], float] = {}
+        pressed: dict[tuple[PartKind, PartKind, str], Array] = {}
         for i in np.flatnonzero(mixed).tolist():
-            a, b = pairs[i].tolist()
+            (a, b), sign = pairs[i].tolist(), -1.0
             if not own[i, 0]:
-                a, b = b, a
+                a, b, sign = b, a, 1.0
             mujoco.mj_contactForce(model, data, i, self._wrench)
             key = (self._kinds[a], self._kinds[b], self._body_names[b])
-            pressed[key] = pressed.get(key, 0.0) + float(self._wrench[0])
-        self._touches.extend(Touch(self._n, *key, force) for key, force in pressed.items())
+            vector = sign * self._wrench[:3] @ data.contact.frame[i].reshape(3, 3)  # from the first geom on the second
+            pressed.setdefault(key, np.zeros(4))[:] += (self._wrench[0], *vector)
+        for key, (force, x, y, z) in pressed.items():
+            self._touches.append(Touch(self._n, *key, float(force), (float(x), float(y), float(z))))
 
 
 def _speeds(points: Array, twists: Array, centre: Array) -> Array:

@@ -23,6 +23,7 @@ __all__ = [
     "grasps",
     "reversals",
     "tilts",
+    "towards",
 ]
 
 Rng = np.random.Generator
@@ -37,7 +38,7 @@ def at_the_box(look: Look, arena: Arena, rng: Rng) -> Iterator[Ask]:
         at = np.array(look().tcp_m)
         side = rng.choice([-1.0, 0.0, 1.0], size=3)
         goal = np.where(side > 0, high + 0.2, np.where(side < 0, low - 0.2, at))
-        yield from _towards(look, goal, arena, rng, n=int(rng.integers(60, 250)))
+        yield from towards(look, goal, arena, rng, n=int(rng.integers(60, 250)))
 
 
 def at_the_fences(look: Look, arena: Arena, rng: Rng) -> Iterator[Ask]:
@@ -45,7 +46,7 @@ def at_the_fences(look: Look, arena: Arena, rng: Rng) -> Iterator[Ask]:
     while True:
         goals = arena.fences_m or arena.things_m
         goal = np.array(goals[int(rng.integers(len(goals)))]) + rng.normal(size=3) * 0.05
-        yield from _towards(look, goal, arena, rng, n=int(rng.integers(60, 250)))
+        yield from towards(look, goal, arena, rng, n=int(rng.integers(60, 250)))
 
 
 def at_the_things(look: Look, arena: Arena, rng: Rng) -> Iterator[Ask]:
@@ -55,9 +56,9 @@ def at_the_things(look: Look, arena: Arena, rng: Rng) -> Iterator[Ask]:
         beside = rng.normal(size=3) * [0.06, 0.06, 0.0] if rng.random() < 0.5 else np.zeros(3)
         over = np.array([x, y, rng.uniform(z, 0.3)]) + beside
         grip = [None, Grip.OPEN, Grip.CLOSE][int(rng.integers(3))]
-        yield from _towards(look, over, arena, rng, n=120, grip=grip)
-        yield from _towards(look, np.array([x, y, z - 0.1]), arena, rng, n=int(rng.integers(40, 120)), grip=grip)
-        yield from _towards(look, over + np.array([0.0, 0.0, 0.1]), arena, rng, n=25, grip=grip)
+        yield from towards(look, over, arena, rng, n=120, grip=grip)
+        yield from towards(look, np.array([x, y, z - 0.1]), arena, rng, n=int(rng.integers(40, 120)), grip=grip)
+        yield from towards(look, over + np.array([0.0, 0.0, 0.1]), arena, rng, n=25, grip=grip)
 
 
 def at_the_joints(look: Look, arena: Arena, rng: Rng) -> Iterator[Ask]:
@@ -99,11 +100,11 @@ def at_the_singular(look: Look, arena: Arena, rng: Rng) -> Iterator[Ask]:
     while True:
         kind = int(rng.integers(4))
         if kind == 0:
-            yield from _towards(look, np.array([0.0, 0.0, rng.uniform(0.1, 0.5)]), arena, rng, n=200)
+            yield from towards(look, np.array([0.0, 0.0, rng.uniform(0.1, 0.5)]), arena, rng, n=200)
         elif kind == 1:
             bearing = rng.uniform(-1.2, 1.2)
             goal = np.array([1.2 * math.cos(bearing), 1.2 * math.sin(bearing), rng.uniform(0.05, 0.3)])
-            yield from _towards(look, goal, arena, rng, n=200)
+            yield from towards(look, goal, arena, rng, n=200)
         else:
             joint = 2 if kind == 2 else 4
             for _ in range(200):
@@ -118,7 +119,7 @@ def full_speed(look: Look, arena: Arena, rng: Rng) -> Iterator[Ask]:
     while True:
         corner = np.where(rng.random(3) < 0.5, low, high)
         corner[2] = rng.uniform(0.6 * high[2], high[2])
-        yield from _towards(look, corner, arena, rng, n=160, speed=5.0)
+        yield from towards(look, corner, arena, rng, n=160, speed=5.0)
 
 
 def circles(look: Look, arena: Arena, rng: Rng) -> Iterator[Ask]:
@@ -127,7 +128,7 @@ def circles(look: Look, arena: Arena, rng: Rng) -> Iterator[Ask]:
     while True:
         centre = np.where(rng.random(3) < 0.5, low, high)
         centre = np.where(rng.random(3) < 0.6, centre, rng.uniform(low, high))
-        yield from _towards(look, centre, arena, rng, n=120)
+        yield from towards(look, centre, arena, rng, n=120)
         rate, u, v = rng.uniform(1.0, 12.0), rng.normal(size=3), rng.normal(size=3)
         u /= np.linalg.norm(u)
         v -= u * (u @ v)
@@ -142,7 +143,7 @@ def reversals(look: Look, arena: Arena, rng: Rng) -> Iterator[Ask]:
     """Down until something is felt, away at once, and down again."""
     while True:
         x, y, z = arena.things_m[int(rng.integers(len(arena.things_m)))]
-        yield from _towards(look, np.array([x, y, z + 0.1]), arena, rng, n=120)
+        yield from towards(look, np.array([x, y, z + 0.1]), arena, rng, n=120)
         for _ in range(int(rng.integers(2, 8))):
             for _ in range(80):
                 yield Send(Twist(linear_m_s=(0.0, 0.0, -2.0 * arena.speed_m_s)))
@@ -157,10 +158,10 @@ def grasps(look: Look, arena: Arena, rng: Rng) -> Iterator[Ask]:
     """Over something loose, down, shut, up and off with it, opened in mid-air or not."""
     while True:
         x, y, z = arena.loose_m[int(rng.integers(len(arena.loose_m)))] if arena.loose_m else arena.things_m[0]
-        yield from _towards(look, np.array([x, y, 0.25]), arena, rng, n=150, grip=Grip.OPEN)
-        yield from _towards(look, np.array([x, y, z]), arena, rng, n=100, grip=Grip.OPEN)
-        yield from _towards(look, np.array([x, y, z]), arena, rng, n=50, grip=Grip.CLOSE, stay=True)
-        yield from _towards(look, np.array([x, y, 0.35]), arena, rng, n=40, grip=Grip.CLOSE)
+        yield from towards(look, np.array([x, y, 0.25]), arena, rng, n=150, grip=Grip.OPEN)
+        yield from towards(look, np.array([x, y, z]), arena, rng, n=100, grip=Grip.OPEN)
+        yield from towards(look, np.array([x, y, z]), arena, rng, n=50, grip=Grip.CLOSE, stay=True)
+        yield from towards(look, np.array([x, y, 0.35]), arena, rng, n=40, grip=Grip.CLOSE)
         shaken = rng.normal(size=3) * 3.0 * arena.speed_m_s
         for k in range(60):
             sign = 1.0 if k // 8 % 2 else -1.0
@@ -184,7 +185,7 @@ def gate_presses(look: Look, arena: Arena, rng: Rng) -> Iterator[Ask]:
     """Joints to the gate that go on pressing on what the tool stands on."""
     while True:
         x, y, z = arena.things_m[int(rng.integers(len(arena.things_m)))]
-        yield from _towards(look, np.array([x, y, z - 0.05]), arena, rng, n=150)
+        yield from towards(look, np.array([x, y, z - 0.05]), arena, rng, n=150)
         q, push = np.array(look().q_rad), rng.uniform(0.0005, 0.01)
         for _ in range(80):
             q = q + push * np.array([0.0, 1.0, rng.uniform(-0.2, 0.2), -1.0, 0.0, 0.0])
@@ -198,7 +199,7 @@ def gate_grips(look: Look, arena: Arena, rng: Rng) -> Iterator[Ask]:
     while True:
         x, y, z = loose[int(rng.integers(len(loose)))]
         if rng.random() < 0.7:
-            yield from _towards(look, np.array([x, y, z]), arena, rng, n=180, grip=Grip.OPEN)
+            yield from towards(look, np.array([x, y, z]), arena, rng, n=180, grip=Grip.OPEN)
         q = look().q_rad
         excess = np.full(3, 1.0)
         excess[int(rng.integers(3))] = rng.choice([1.0, 1.03, 1.045, 1.3])
@@ -214,7 +215,7 @@ def gate_grips(look: Look, arena: Arena, rng: Rng) -> Iterator[Ask]:
             )
 
 
-def _towards(
+def towards(
     look: Look,
     goal: np.ndarray,
     arena: Arena,

@@ -67,6 +67,8 @@ class Arena(msgspec.Struct, frozen=True, kw_only=True):
     """Points beyond planes and inside keep-outs."""
     grip: tuple[GripCommand, GripCommand]
     """The hand open and shut with what it may be asked for at most."""
+    grip_least: GripCommand
+    """The hand shut with the least that it may be asked for."""
 
 
 Look = Callable[[], Seen]

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import msgspec
 import numpy as np
 
-from robot.teleop import aimed, hostile, human
+from robot.teleop import aimed, creeping, hostile, human
 from robot.teleop.asks import Arena, Ask, Look, Maker
 from robot.teleop.search import Candidates, played
 
@@ -19,9 +19,13 @@ FAMILIES: dict[str, Maker] = {
         hostile.mixed, aimed.at_the_box, aimed.at_the_fences, aimed.at_the_joints, aimed.at_the_singular,
         aimed.at_the_things, aimed.circles, aimed.fast_joints, aimed.full_speed, aimed.gate_at_places,
         aimed.gate_grips, aimed.gate_presses, aimed.grasps, aimed.reversals, aimed.tilts, human.reaches,
-        human.presses, human.hesitations,
+        human.presses, human.hesitations, creeping.gate_creeps, creeping.gate_leans, creeping.gate_hands,
     )
 }  # fmt: skip
+LATE = ("gate_creeps", "gate_leans", "gate_hands")
+"""Families that came later: they have the last numbers of those that stand alone, so that no other's changed."""
+LATE_SHARE = 20
+"""One stream in so many is theirs."""
 SEARCH_SHARE = 8
 """One stream in so many is a search's."""
 
@@ -55,10 +59,12 @@ class Battery:
     """
 
     def __init__(self, *, seed: int, n_streams: int, n_plants: int) -> None:
-        self._seed, self._n_plants, self._names = seed, n_plants, tuple(FAMILIES)
+        self._seed, self._n_plants = seed, n_plants
+        self._names = tuple(name for name in FAMILIES if name not in LATE)
         self.n_streams = n_streams
         n_search = n_streams // SEARCH_SHARE // Candidates.BLOCK * Candidates.BLOCK
         self._n_plain = n_streams - n_search
+        self._first_late = self._n_plain - self._n_plain // LATE_SHARE
 
     @property
     def n_plain(self) -> int:
@@ -67,7 +73,7 @@ class Battery:
 
     def place(self, number: int) -> Place:
         """Return family and plant of a stream that stands alone."""
-        names = self._names
+        names = self._names if number < self._first_late else LATE
         return Place(number=number, family=names[number % len(names)], plant=number // len(names) % self._n_plants)
 
     def searches(self) -> tuple[Search, ...]:

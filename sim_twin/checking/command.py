@@ -12,10 +12,11 @@ from config.resolved import Resolved
 from robot.bench import BenchResult, bench_report
 from robot.teleop.wanted import Answer, Wanted
 from sim_twin.checking.check import N_COMMANDS, Setup, check_streams, part_of, rerun
-from sim_twin.checking.mutations import MUTATIONS, try_mutation
+from sim_twin.checking.mutations import try_mutation
 from sim_twin.checking.report import CheckReport, MutationReport, as_json, draw, shown, shown_mutations
 from sim_twin.checking.ring import StreamResult
 from sim_twin.checking.tally import Tally
+from sim_twin.checking.weakenings import MUTATIONS
 
 __all__ = ["check_rig", "measured"]
 

@@ -74,6 +74,7 @@ def arena_of(resolved: Resolved, profile: Profile) -> Arena:
             GripCommand(opening_m=grip.opening_m[1], force_n=force, speed_m_s=speed),
             GripCommand(opening_m=grip.opening_m[0], force_n=force, speed_m_s=speed),
         ),
+        grip_least=GripCommand(opening_m=grip.opening_m[0], force_n=grip.force_n[0], speed_m_s=grip.speed_m_s[0]),
     )
 
 

@@ -14,7 +14,7 @@ from robot.errors import RobotConfigError
 from robot.hal.fake import FakeArm
 from robot.kinematics import Kinematics
 from robot.messages import ArmMode, GripCommand, Heading, Outcome
-from robot.safety import Gate, GateLimits, Reason
+from robot.safety import Block, Gate, GateLimits, Reason
 from tests.support.profiles import ANY_RATE, envelope, open_envelope, profile
 from tests.support.stations import TICK_NS, arm_state, command
 
@@ -105,6 +105,22 @@ def test_speed_is_measured_from_the_last_command_sent(gate):
     assert gate.write(moved(2, step), state(2), now_ns=2 * TICK_NS) is None
     verdict = gate.write(moved(3, 0.0), state(3), now_ns=3 * TICK_NS)
     assert verdict.reason == Reason.JOINT_SPEED
+
+
+def test_what_stands_around_reaches_the_stop_check_and_nothing_where_there_is_none(arm, gate):
+    class Stops:
+        def __init__(self):
+            self.blocks = []
+
+        def put(self, blocks):
+            self.blocks.append(blocks)
+
+    stops, blocks = Stops(), (Block(name="a", centre_m=(0.4, 0.0, 0.1), half_m=(0.1, 0.1, 0.1)),)
+    made = Gate(arm=arm, limits=gate.limits, envelope=open_envelope(), chain=CHAIN, stops=stops)
+    made.surround(blocks)
+    assert stops.blocks == [blocks]
+    gate.surround(blocks)
+    assert gate.write(command(START), state(), now_ns=0) is None
 
 
 def test_holding_still_is_always_allowed(arm, gate):

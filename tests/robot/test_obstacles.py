@@ -167,6 +167,23 @@ def test_a_lid_that_nobody_has_told_of_is_anywhere():
     assert LidWatch(BOX).state is LidState.UNKNOWN
 
 
+def test_what_is_in_the_way_of_leaves_that_have_arrived_changes_nothing():
+    lid = LidWatch(BOX)
+    lid.seed(0, 0)
+    lid.note(BIT, 0)
+    lid.hold_up(10)
+    assert not lid.note(BIT, TRAVEL_NS)
+    assert lid.note(BIT, 10 + TRAVEL_NS)
+    lid.hold_up(20 + TRAVEL_NS)
+    assert lid.state is LidState.OPEN
+    assert not lid.note(BIT, 20 + TRAVEL_NS)
+
+
+def test_a_thing_that_nobody_has_seen_yet_holds_up_no_leaf(table):
+    assert table.watch(BIT, FAR, 10**9)
+    assert table.watch(BIT, FAR, 10**9 + TRAVEL_NS)
+
+
 def test_seeding_takes_a_lid_to_be_as_told_but_for_one_that_is_on_its_way():
     lid = LidWatch(BOX)
     for bits, state in ((BIT, LidState.OPEN), (0, LidState.SHUT)):

@@ -7,7 +7,7 @@ import pytest
 from robot.messages import GripCommand, Heading, Hold, JointTarget, Twist
 from robot.safety.checks import check_intent
 from robot.teleop import Arena, Battery, Seen, Send, Silence, Write
-from robot.teleop.battery import FAMILIES
+from robot.teleop.battery import FAMILIES, LATE
 from robot.teleop.human import minimum_jerk
 from robot.teleop.search import Candidates, played
 
@@ -17,6 +17,7 @@ ARENA = Arena(
     tick_s=0.01, speed_m_s=0.25, box_m=((0.24, -0.36, 0.015), (0.64, 0.36, 0.32)), q_min_rad=(-6.28,) * 6,
     q_max_rad=(6.28,) * 6, qd_max_rad_s=(1.0,) * 6, home_rad=HOME, things_m=((0.3, 0.0, 0.05), (0.5, 0.2, 0.12)),
     loose_m=((0.54, 0.25, 0.04),), fences_m=((0.0, 0.0, 0.0),), grip=(GRIP, GRIP),
+    grip_least=GripCommand(opening_m=0.0, force_n=20.0, speed_m_s=0.02),
 )  # fmt: skip
 BATTERY = Battery(seed=3, n_streams=300, n_plants=6)
 HOSTILE = ("not_finite", "malformed")
@@ -82,11 +83,56 @@ def test_a_person_stays_below_the_speed_that_is_allowed_but_for_tremor():
 
 
 def test_every_number_has_one_place_and_families_meet_every_plant():
-    places = [BATTERY.place(k) for k in range(BATTERY.n_plain)]
+    battery = Battery(seed=3, n_streams=600, n_plants=6)
+    places = [battery.place(k) for k in range(battery.n_plain)]
     assert {(p.family, p.plant) for p in places} == set(itertools.product(FAMILIES, range(6)))
     blocks = BATTERY.searches()
     assert [b.first for b in blocks] == list(range(BATTERY.n_plain, 300, Candidates.BLOCK))
     assert sum(b.n_streams for b in blocks) + BATTERY.n_plain == 300
+
+
+def test_families_that_came_later_have_the_last_numbers_and_changed_no_others():
+    names = [BATTERY.place(k).family for k in range(BATTERY.n_plain)]
+    first = next(k for k, name in enumerate(names) if name in LATE)
+    assert names[:first] == list(itertools.islice(itertools.cycle(f for f in FAMILIES if f not in LATE), first))
+    assert set(names[first:]) == set(LATE)
+
+
+def writes(family: str, look=still, seed: int = 0) -> list[Write]:
+    came = itertools.islice(FAMILIES[family](look, ARENA, np.random.default_rng(seed)), 400)
+    return [ask for ask in came if isinstance(ask, Write)]
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_who_creeps_goes_one_way_and_slowly_at_the_gate(seed):
+    steps = np.diff([w.q_rad for w in writes("gate_creeps", seed=seed)][:100], axis=0)
+    assert 1e-5 < np.abs(steps).max() < 0.004
+    ways = steps / np.abs(steps).max(axis=1, keepdims=True)
+    assert np.abs(ways - ways[0]).max() < 1e-6
+
+
+def test_who_creeps_begins_anew_after_a_latch():
+    def latched() -> Seen:
+        return Seen(q_rad=HOME, tcp_m=(0.4, 0.0, 0.2), force_n=(0.0, 0.0, 0.0), is_latched=True)
+
+    assert writes("gate_creeps", latched) == writes("gate_leans", latched) == []
+
+
+def test_who_leans_on_something_goes_on_more_slowly_once_it_bears():
+    def borne() -> Seen:
+        return Seen(q_rad=HOME, tcp_m=(0.4, 0.0, 0.2), force_n=(0.0, 0.0, 20.0))
+
+    free, held = (np.diff([w.q_rad for w in writes("gate_leans", look)][20:60], axis=0) for look in (still, borne))
+    assert np.abs(held).max() < 0.6 * np.abs(free).max()
+
+
+def test_a_hand_is_asked_for_less_than_the_least_and_more_than_the_most():
+    grips = [w.grip for seed in range(40) for w in writes("gate_hands", seed=seed)]
+    least, most = ARENA.grip_least, ARENA.grip[0]
+    for name in ("force_n", "speed_m_s"):
+        asked = [getattr(grip, name) for grip in grips]
+        assert min(asked) < getattr(least, name) < getattr(most, name) < max(asked)
+    assert max(grip.opening_m for grip in grips) > most.opening_m
 
 
 def test_streams_of_different_numbers_are_drawn_apart():

@@ -8,11 +8,12 @@ from config.limits import ArmPart, KeepOut, Plane, Touched
 from config.loader import resolve
 from config.posture import part_points
 from sim_twin.allowances import allowances_for
+from sim_twin.contacts import pressing_n
 from sim_twin.monitor import Monitor
 from sim_twin.names import on_table
 from sim_twin.perturb import NOMINAL, perturbed_plant
 from sim_twin.readings import Reading
-from sim_twin.recorder import PartKind, part_kinds
+from sim_twin.recorder import PartKind, Touch, part_kinds
 from tests.support.monitor_stage import Stage
 
 replace = msgspec.structs.replace
@@ -290,6 +291,39 @@ def test_a_clearance_is_the_physics_own_distance(stage, off, is_seen):
     assert stage.judge(replace(stage.profile, clearances=clearances))["scene_clearance"].is_broken is is_seen
 
 
+@pytest.mark.parametrize(("off", "is_seen"), [(-0.0005, False), (0.002, True)])
+def test_a_set_point_too_near_to_something_is_seen_though_the_arm_is_not_there(stage, off, is_seen):
+    stage.tick(2)
+    before = stage.judge()["scene_clearance"].value
+    stage.data.ctrl[stage.world.joint_controls[1]] += 0.45  # hand and wrist far down, which takes longer than a tick
+    stage.tick()
+    came = stage.judge()
+    asked_m = came["command_scene_clearance"].value
+    assert asked_m < before - 0.005 < came["scene_clearance"].value
+    held = replace(stage.profile.clearances, scene_m=max(asked_m + off, 1e-3))
+    assert stage.judge(replace(stage.profile, clearances=held))["command_scene_clearance"].is_broken is is_seen
+
+
+def test_friction_counts_as_a_push_on_the_arm(stage):
+    press(stage, "green_button")
+    stage.tick(10)
+    course = stage.recorder.course()
+    touch = max(course.touches, key=lambda t: t.force_n)
+    plain = pressing_n(course)[touch.step]
+    side = replace(touch, force_n=0.0, vector_n=(300.0, -400.0, 0.0))
+    assert pressing_n(replace(course, touches=(side,)))[touch.step] == pytest.approx(500.0)
+    assert plain >= touch.force_n * 0.999
+
+
+def test_a_squeeze_counts_although_it_pushes_nowhere(stage):
+    stage.tick(3)
+    course = stage.recorder.course()
+    pair = [Touch(4, PartKind.FINGERS, PartKind.OBJECT, "a", 50.0, (sign * 50.0, 0.0, 0.0)) for sign in (-1.0, 1.0)]
+    force = pressing_n(replace(course, touches=tuple(pair)))
+    assert force[4] == pytest.approx(100.0)
+    assert force.sum() == force[4]
+
+
 def test_an_arm_folded_into_itself_is_seen_though_the_physics_lets_it_through(stage):
     q = stage.data.qpos[:6].copy()
     q[2], q[3] = 2.9, 0.0
@@ -313,6 +347,41 @@ def test_a_hand_that_presses_too_hard_is_seen(stage):
     stage.world.opening_asked_m = stage.world.opening_goal_m = 0.0
     stage.tick(1)
     assert stage.judge()["grip_force"].is_broken
+
+
+@pytest.mark.parametrize(("force_n", "is_seen"), [(19.9, True), (20.0, False), (235.0, False), (236.0, True)])
+def test_a_force_that_is_asked_of_the_hand_is_held_to_both_ends_though_nothing_is_gripped(stage, force_n, is_seen):
+    stage.world.limit_grip(force_n)
+    stage.tick(3)
+    came = stage.judge()["command_grip_force"]
+    assert came.is_broken is is_seen
+    assert came.value == force_n
+
+
+@pytest.mark.parametrize(("speed", "is_seen"), [(0.0199, True), (0.02, False), (0.15, False), (0.151, True)])
+def test_a_speed_that_is_asked_of_a_hand_that_moves_is_held_to_both_ends(stage, speed, is_seen):
+    stage.world.grip_speed_m_s = speed
+    stage.tick(3)
+    assert not stage.judge()["command_grip_speed"].is_broken  # it rests
+    stage.world.opening_goal_m = 0.05
+    stage.tick(3)
+    assert stage.judge()["command_grip_speed"].is_broken is is_seen
+
+
+@pytest.mark.parametrize("towards", [-1.0, 1.0])
+@pytest.mark.parametrize(("gap", "share"), [(0.15, 0.775), (0.02, 0.19)])
+def test_a_set_point_in_a_soft_margin_is_held_to_what_is_left_of_its_speed(stage, towards, gap, share):
+    """A tenth of 1 rad/s at the end and all of it 0.2 rad before: 0.1 + 0.9 gap / 0.2."""
+    at = float(stage.data.qpos[5])
+    ends = (at - gap - 0.5, at + gap) if towards > 0 else (at - gap, at + gap + 0.5)
+    joints = (*stage.profile.joints[:5], replace(stage.profile.joints[5], range_rad=ends, soft_margin_rad=0.2))
+    profile = replace(stage.profile, joints=joints)
+    for part, way, is_seen in ((1.01, 1.0, True), (0.99, 1.0, False), (1.01, -1.0, False)):
+        stage.lay_out()
+        for here in (at - way * towards * part * share * 0.01, at):
+            stage.data.ctrl[stage.world.joint_controls[5]] = here
+            stage.tick()
+        assert stage.judge(profile)["command_soft_margin"].is_broken is is_seen
 
 
 def test_fingers_wider_than_allowed_are_seen(stage):
