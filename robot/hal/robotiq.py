@@ -38,9 +38,9 @@ _FAULTS = {
     8: "too hot", 9: "no communication", 10: "too little voltage", 11: "automatic release under way",
     12: "internal fault", 13: "activation failed", 14: "too much current", 15: "automatic release done",
 }  # fmt: skip
-SILENT_LIMIT, WATCHED_LIMIT = 200, 36
+SILENT_LIMIT, WATCHED_LIMIT = 200, 32
 """Polls without an answer after which a gripper counts as gone that was not commanded yet, and one that was. At 500 a
-second the latter is lost after 72 ms, and after 88 where it had just answered: 100 are asked."""
+second the latter is lost after 64 ms, and after 80 where it had just answered: 100 are asked."""
 
 
 class GripScale(msgspec.Struct, frozen=True, kw_only=True):

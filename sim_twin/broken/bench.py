@@ -17,7 +17,7 @@ def bench_faults(*, full: bool) -> BenchReport:
     """Put an arm under way through each fault of a virtual controller.
 
     Args:
-        full: all faults (some 8 min); otherwise those of a cut, a freeze, a hang and a safeguard.
+        full: all faults (some 10 min); otherwise those of a cut, a freeze, a hang and a safeguard.
     """
     begun = perf_counter()
     with Course(HOST) as course:

@@ -255,6 +255,7 @@ class Faults:
             "runtime": machine.modes.runtime.name,
             "robot_mode": machine.modes.robot.name,
             "safety_mode": machine.modes.safety.name,
+            "safety_inputs": self._robot.safety.closed,
         }
 
     def tick_times(self, clear: bool = False) -> Answer:

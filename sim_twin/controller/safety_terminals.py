@@ -65,6 +65,11 @@ class SafetyTerminals:
         """The functions that are wired."""
         return tuple(sorted(self._bits))
 
+    @property
+    def closed(self) -> dict[str, bool]:
+        """Whether each input that is wired is closed."""
+        return dict(self._closed)
+
     def set(self, name: str, *, is_closed: bool, handle: Callable[[Event], str | None]) -> str | None:
         """Open or close an input, and return why what it brings about does not happen; None where it does.
 

@@ -119,9 +119,25 @@ def external():
   tell("norm", norm([3, 4]))
   tell("pow", pow(2, 10))
   tell("inverse", get_inverse_kin(get_forward_kin(home), qnear=home))
+  sync()
+  tell("reachable", get_inverse_kin_has_solution(start))
+  sync()
+  tell("out_of_reach", get_inverse_kin_has_solution(p[3, 0, 0, 0, 0, 0]))
+  sync()
+  tell("within_limits", is_within_safety_limits(start))
+  sync()
+  tell("beyond_limits", is_within_safety_limits([0, 0, 7, 0, 0, 0]))
+  tell(
+    "list_sum",
+    [1, 2, 3] + 2 * [10, 20, 30]
+  )
+  popup("a word", title="external", warning=False, error=False, blocking=False)
   textmsg("all told")
 {more}
+  socket_send_int(-2, "peer")
   socket_close("peer")
+  halt
+  textmsg("after halt")
 end
 """
 TORQUES = """\
@@ -134,6 +150,8 @@ TORQUES = """\
   tell("mass_matrix", get_mass_matrix())
   optimovej(home, a=0.5, v=0.5)
   tell("optimovej", get_target_joint_positions())
+  optimovel(pose_trans(start, p[0, 0, -0.05, 0, 0, 0]), a=0.5, v=0.5)
+  tell("optimovel", get_actual_tcp_pose())
 """
 NUMBERS = (41, -8)
 
@@ -153,13 +171,14 @@ def told_by(minor, more=""):
             ended(robot, 20_000)
             peer.settimeout(10.0)
             heard = b"".join(iter(lambda: peer.recv(65_536), b""))
-    told = {}
-    for line in heard.decode().splitlines():
+    told: dict = {"sent_int": struct.unpack(">i", heard[-4:])[0]}
+    for line in heard[:-4].decode().splitlines():
         name, _, value = line.partition(" ")
         with suppress(ValueError, SyntaxError):
             told[name] = ast.literal_eval(value.removeprefix("p"))
         told.setdefault(name, value)
     assert any("all told" in line for line in lines(robot)), lines(robot)[-5:]
+    assert not any("after halt" in line for line in lines(robot))
     return robot, q_rad, told
 
 
@@ -217,9 +236,18 @@ def test_what_is_set_is_told_and_arrives(ran):
     assert robot.machine.io.digital_out >> 3 & 1
     assert told["digital_out"] is True or told["digital_out"] == "True"
     assert (told["norm"], told["pow"]) == (5.0, 1024)
+    assert told["sent_int"] == -2
     journal = " ".join(lines(robot))
+    assert "a word" in journal
     assert "external force sensor: on" in journal
     assert "external force sensor: off" in journal
+
+
+def test_what_can_be_reached_and_what_is_allowed_is_told_and_lists_are_reckoned_with(ran):
+    _, _, told = ran
+    assert (told["reachable"], told["out_of_reach"]) == (True, False)
+    assert (told["within_limits"], told["beyond_limits"]) == (True, False)
+    assert told["list_sum"] == [21, 42, 63]
 
 
 @pytest.mark.slow
@@ -227,3 +255,4 @@ def test_torques_the_mass_matrix_and_optimised_moves_came_with_later_versions():
     _, q_rad, told = told_by(26, TORQUES)
     assert np.array(told["mass_matrix"]).shape == (6, 6)
     assert off(told, "optimovej", q_rad) < 2e-3
+    assert told["optimovel"][2] == pytest.approx(told["movel"][2] + 0.05, abs=5e-3)

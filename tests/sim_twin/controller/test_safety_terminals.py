@@ -41,6 +41,14 @@ def test_the_systems_emergency_stop_takes_the_power_until_it_is_closed_again():
     assert modes.safety is SafetyMode.NORMAL
 
 
+def test_the_truth_tells_which_inputs_are_wired_and_closed():
+    _, fault = wired({"safeguard": "CI2", "safeguard_reset": "CI4"})
+    assert fault("truth")["safety_inputs"] == {"safeguard": True, "safeguard_reset": False}
+    fault("terminal", name="safeguard")
+    assert fault("truth")["safety_inputs"] == {"safeguard": False, "safeguard_reset": False}
+    assert wired({})[1]("truth")["safety_inputs"] == {}
+
+
 def test_a_safeguard_with_a_reset_waits_for_its_button():
     robot, fault = wired()
     fault("terminal", name="safeguard")
