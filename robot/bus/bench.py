@@ -1,10 +1,10 @@
-"""The bus bench: one way beside zenoh-python alone and pyzmq, in blocks that take turns; messages lost at 500 Hz."""
+"""The bus bench: one way beside zenoh-python alone and pyzmq, message by message; messages lost at 500 Hz."""
 
 import os
 import socket
 import subprocess
 import sys
-from collections import defaultdict
+from contextlib import ExitStack
 from importlib.util import find_spec
 from pathlib import Path
 from time import perf_counter
@@ -15,15 +15,16 @@ from rich.progress import track
 
 from robot.bench import BenchReport, BenchResult, bench_report
 from robot.bus.bench_blocks import Job, Listening, listen
+from robot.bus.errors import BusError
 from robot.bus.pace import spread_of
 
 __all__ = ["bench_bus"]
 
-N_ROUNDS, N_ROUNDS_FULL = 2, 10
-N_SKIPPED = 10
-"""First messages of a block that are not judged: links and memory are still being made ready."""
-PERIOD_NS_BY_SIZE = {"small": 5_000_000, "kib": 5_000_000, "frame": 33_333_333}
-N_BY_SIZE = {"small": 300, "kib": 300, "frame": 60}
+N_SKIPPED = 20
+"""First messages that are not judged: links and memory are still being made ready."""
+PERIOD_NS_BY_SIZE = {"small": 10_000_000, "kib": 10_000_000, "frame": 60_000_000}
+N_BY_SIZE = {"small": 1000, "kib": 1000, "frame": 170}
+N_FULL_FACTOR = 10
 LABEL_BY_SIZE = {"small": "64b", "kib": "1kb", "frame": "frame"}
 RATIO_GOAL = 1.3
 LOSS_PERIOD_NS = 2_000_000
@@ -35,28 +36,21 @@ def bench_bus(*, full: bool) -> BenchReport:
     """Time messages of 64 B, 1 kB and 0.9 MB one way; count what is lost of 2500 at 500 Hz, of a million with full."""
     begin = perf_counter()
     transports = ("ours", "raw", *(("zmq",) if find_spec("zmq") else ()))
-    ages_ns: dict[tuple[str, str], list[int]] = defaultdict(list)
-    rounds = range(N_ROUNDS_FULL if full else N_ROUNDS)
-    for _ in track(rounds, "bus", console=Console(stderr=True), transient=True, auto_refresh=False):
-        for size, period_ns in PERIOD_NS_BY_SIZE.items():
-            for transport in transports:
-                job = Job(
-                    transport=transport, size=size, endpoint=_endpoint(), n=N_BY_SIZE[size], period_ns=period_ns
-                )  # fmt: skip
-                ages_ns[size, transport] += _run(job).ages_ns[N_SKIPPED:]
-    rows = [row for size in PERIOD_NS_BY_SIZE for row in _size_rows(size, transports, ages_ns)]
+    rows = []
+    for size in track(PERIOD_NS_BY_SIZE, "bus", console=Console(stderr=True), transient=True, auto_refresh=False):
+        n = N_BY_SIZE[size] * (N_FULL_FACTOR if full else 1)
+        heard = _run(size, transports, n=n, period_ns=PERIOD_NS_BY_SIZE[size])
+        rows += _size_rows(size, {name: listening.ages_ns[N_SKIPPED:] for name, listening in heard.items()})
     return bench_report("bus", (*rows, *_loss_rows(N_LOSS_FULL if full else N_LOSS)), seconds=perf_counter() - begin)
 
 
-def _size_rows(
-    size: str, transports: tuple[str, ...], ages_ns: dict[tuple[str, str], list[int]]
-) -> list[BenchResult]:  # fmt: skip
+def _size_rows(size: str, ages_ns: dict[str, list[int]]) -> list[BenchResult]:
     rows, p50_us = [], {}
     label = LABEL_BY_SIZE[size]
-    for transport in transports:
-        spread = spread_of(ages_ns[size, transport])
+    for transport, ages in ages_ns.items():
+        spread = spread_of(ages)
         if spread is None:
-            raise RuntimeError(f"bench bus: expected messages over {transport}, none came")
+            raise BusError(f"bench bus: expected messages over {transport}, none came")
         p50_us[transport] = 1e3 * spread.p50_ms
         prefix = "" if transport == "ours" else f"{transport}_"
         rows += [
@@ -75,7 +69,7 @@ def _size_rows(
 
 def _loss_rows(n: int) -> tuple[BenchResult, ...]:
     """Return what was lost of so many: by the number that were written, and as the bus itself tells."""
-    heard = _run(Job(transport="ours", size="small", endpoint=_endpoint(), n=n, period_ns=LOSS_PERIOD_NS))
+    heard = _run("small", ("ours",), n=n, period_ns=LOSS_PERIOD_NS)["ours"]
     n_lost, n_told = n - len(heard.ages_ns), heard.n_lost() or 0
     spread = spread_of(heard.ages_ns)
     return (
@@ -87,19 +81,21 @@ def _loss_rows(n: int) -> tuple[BenchResult, ...]:
     )  # fmt: skip
 
 
-def _run(job: Job) -> Listening:
-    """Listen here while a process of its own writes."""
-    heard = listen(job)
-    try:
+def _run(size: str, transports: tuple[str, ...], *, n: int, period_ns: int) -> dict[str, Listening]:
+    """Listen here while a process of its own writes, and return what came by transport."""
+    with ExitStack() as listenings:
+        job = Job(size=size, endpoints={name: _endpoint() for name in transports}, n=n, period_ns=period_ns)
+        heard = {}
+        for name, endpoint in job.endpoints.items():
+            heard[name] = listen(name, size, endpoint)
+            listenings.callback(heard[name].close)
         writer = subprocess.run(
             [sys.executable, "-m", "robot.bus.bench_blocks"], input=msgspec.json.encode(job) + b"\n", check=False,
-            cwd=Path(__file__).parents[2], timeout=START_S + 2 * job.n * job.period_ns / NS_PER_S,
+            cwd=Path(__file__).parents[2], timeout=START_S + 3 * n * period_ns / NS_PER_S,
             stdout=subprocess.DEVNULL, stderr=subprocess.PIPE,
         )  # fmt: skip
         if writer.returncode:
-            raise RuntimeError(f"bench bus: expected the writer to end, got: {writer.stderr.decode()[-500:]}")
-    finally:
-        heard.close()
+            raise BusError(f"bench bus: expected the writer to end, got: {writer.stderr.decode()[-500:]}")
     return heard
 
 

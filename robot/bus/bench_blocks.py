@@ -6,6 +6,7 @@ its writer began to make it; ours are Structs, the others' bytes that were there
 
 import sys
 from collections.abc import Callable
+from contextlib import ExitStack
 from struct import Struct as Form
 from threading import Thread
 from time import monotonic_ns, sleep
@@ -59,11 +60,14 @@ _MESSAGES: dict[str, Callable[[], msgspec.Struct]] = {
 class Job(msgspec.Struct, frozen=True, kw_only=True):
     """What the other process is to write."""
 
-    transport: str
     size: str
-    endpoint: str
+    endpoints: dict[str, str]
+    """Where each transport's reader listens. The transports take turns, message by message, so that what else the
+    machine does meets all of them alike."""
     n: int
+    """Of messages over each."""
     period_ns: int
+    """Between two messages over one of them."""
 
 
 class Listening:
@@ -85,50 +89,51 @@ class Listening:
         self.ages_ns.append(monotonic_ns() - stamp_ns)
 
 
-def listen(job: Job) -> Listening:
+def listen(transport: str, size: str, endpoint: str) -> Listening:
     """Listen as the hub and return what comes."""
     heard = Listening()
-    if job.transport == "ours":
-        bus = Bus(job.endpoint, serial=SERIAL, role=Role.VIEWER, is_hub=True)
+    if transport == "ours":
+        bus = Bus(endpoint, serial=SERIAL, role=Role.VIEWER, is_hub=True)
         bus.open()
-        subscriber = bus.subscriber(_TOPICS[job.size], lambda received: heard.note(received.envelope.stamp_ns))
+        subscriber = bus.subscriber(_TOPICS[size], lambda received: heard.note(received.envelope.stamp_ns))
         heard.close, heard.n_lost = bus.close, lambda: subscriber.counts.lost
-    elif job.transport == "raw":
-        heard.close = _listen_raw(job, heard)
     else:
-        heard.close = _listen_zmq(job, heard)
+        heard.close = (_listen_raw if transport == "raw" else _listen_zmq)(endpoint, heard)
     return heard
 
 
 def main() -> None:
     """Write what one line of JSON on standard input asks for."""
     job = msgspec.json.decode(sys.stdin.readline(), type=Job)
-    put, close = _writer_of(job)
-    try:
+    with ExitStack() as open_writers:
+        puts = []
+        for transport, endpoint in job.endpoints.items():
+            put, close = _writer_of(transport, job.size, endpoint)
+            open_writers.callback(close)
+            puts.append(put)
         sleep(JOIN_S)
         due_ns = monotonic_ns()
         for _ in range(job.n):
-            put()
-            due_ns += job.period_ns
-            sleep(max(due_ns - monotonic_ns(), 0) * 1e-9)
+            for put in puts:
+                put()
+                due_ns += job.period_ns // len(puts)
+                sleep(max(due_ns - monotonic_ns(), 0) * 1e-9)
         sleep(LINGER_S)
-    finally:
-        close()
 
 
-def _writer_of(job: Job) -> _Writer:
-    message = _MESSAGES[job.size]()
-    if job.transport == "ours":
-        bus = Bus(job.endpoint, serial=SERIAL, role=Role.TWIN)
+def _writer_of(transport: str, size: str, endpoint: str) -> _Writer:
+    message = _MESSAGES[size]()
+    if transport == "ours":
+        bus = Bus(endpoint, serial=SERIAL, role=Role.TWIN)
         bus.open()
-        publisher = bus.publisher(_TOPICS[job.size])
+        publisher = bus.publisher(_TOPICS[size])
         return lambda: publisher.put(message), bus.close  # stamped before it is encoded
     body = message.pixels if isinstance(message, Frame) else msgspec.json.encode(message)
-    return _raw_writer(job, body) if job.transport == "raw" else _zmq_writer(job, body)
+    return (_raw_writer if transport == "raw" else _zmq_writer)(endpoint, body)
 
 
-def _listen_raw(job: Job, heard: Listening) -> Callable[[], None]:
-    session = open_link(job.endpoint, is_hub=True, is_by_size=True)
+def _listen_raw(endpoint: str, heard: Listening) -> Callable[[], None]:
+    session = open_link(endpoint, is_hub=True, is_by_size=True)
 
     def take(sample: zenoh.Sample) -> None:
         sample.payload.to_bytes()
@@ -139,19 +144,19 @@ def _listen_raw(job: Job, heard: Listening) -> Callable[[], None]:
     return session.close
 
 
-def _raw_writer(job: Job, body: bytes) -> _Writer:
-    session = open_link(job.endpoint, is_hub=False, is_by_size=True)
+def _raw_writer(endpoint: str, body: bytes) -> _Writer:
+    session = open_link(endpoint, is_hub=False, is_by_size=True)
     publisher = session.declare_publisher(RAW_KEY, congestion_control=zenoh.CongestionControl.DROP, express=True)
     return lambda: publisher.put(body, attachment=_STAMP.pack(monotonic_ns())), session.close
 
 
-def _listen_zmq(job: Job, heard: Listening) -> Callable[[], None]:
+def _listen_zmq(endpoint: str, heard: Listening) -> Callable[[], None]:
     import zmq
 
     context = zmq.Context()
     socket = context.socket(zmq.SUB)
     socket.setsockopt(zmq.SUBSCRIBE, b"")
-    socket.bind(_zmq_endpoint(job))
+    socket.bind(_zmq_endpoint(endpoint))
 
     def read() -> None:
         while True:
@@ -174,12 +179,12 @@ def _listen_zmq(job: Job, heard: Listening) -> Callable[[], None]:
     return close
 
 
-def _zmq_writer(job: Job, body: bytes) -> _Writer:
+def _zmq_writer(endpoint: str, body: bytes) -> _Writer:
     import zmq
 
     context = zmq.Context()
     socket = context.socket(zmq.PUB)
-    socket.connect(_zmq_endpoint(job))
+    socket.connect(_zmq_endpoint(endpoint))
 
     def close() -> None:
         socket.send_multipart((_END, b""))
@@ -189,8 +194,8 @@ def _zmq_writer(job: Job, body: bytes) -> _Writer:
     return lambda: socket.send_multipart((_STAMP.pack(monotonic_ns()), body)), close
 
 
-def _zmq_endpoint(job: Job) -> str:
-    return job.endpoint.replace("tcp/", "tcp://")
+def _zmq_endpoint(endpoint: str) -> str:
+    return endpoint.replace("tcp/", "tcp://")
 
 
 if __name__ == "__main__":

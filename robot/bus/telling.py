@@ -6,6 +6,7 @@ from rich.table import Column, Table
 
 from robot.bus.inlet import Counts
 from robot.bus.pace import Spread
+from robot.bus.topic import Role
 from robot.bus.topics import QUERIES
 from robot.bus.watch import Listener, Seen
 
@@ -64,7 +65,7 @@ def seen_tables(seen: Seen) -> tuple[Table, ...]:
         )  # fmt: skip
     queries = Table("query", "asks", "answers", "answered by", title="queries")
     for query in QUERIES:
-        by = "every process" if len(query.answered_by) > 1 else query.answered_by[0]
+        by = "every process" if len(query.answered_by) == len(Role) else ", ".join(query.answered_by)
         queries.add_row(query.name, query.request.__name__, query.reply.__name__, by)
     tables = [processes, topics, queries]
     if seen.unknown_keys:
