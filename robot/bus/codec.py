@@ -12,7 +12,7 @@ from typing import Generic, NamedTuple, TypeVar
 
 import msgspec
 
-from robot.bus.envelope import SCHEMA_BYTES, Envelope
+from robot.bus.envelope import SCHEMA_BYTES, Origin
 from robot.bus.errors import MalformedError, SchemaError
 
 __all__ = ["Codec", "Encoded", "schema_hash"]
@@ -71,16 +71,16 @@ class Codec(Generic[T]):
         except (msgspec.MsgspecError, ValueError, RecursionError) as error:
             raise MalformedError(f"expected a {self.kind.__name__} in JSON: {error}") from error
 
-    def check_schema(self, envelope: Envelope, *, name: str, reader: str) -> None:
+    def check_schema(self, origin: Origin, *, name: str, reader: str) -> None:
         """Check that a message was written with the type as it is here.
 
         Raises:
             SchemaError: it was not; both sides are named.
         """
-        if envelope.schema != self.schema:
+        if origin.schema != self.schema:
             raise SchemaError(
                 f"{name}: expected {self.kind.__name__} with schema {self.schema.hex()} as {reader} has it, got "
-                f"{envelope.schema.hex()} from {envelope.source}; do both run the same version?"
+                f"{origin.schema.hex()} from {origin.source}; do both run the same version?"
             )
 
     def _text_of(self, message: object) -> tuple[bytes, bool]:

@@ -7,7 +7,7 @@ from typing import Generic, NamedTuple, TypeVar
 import msgspec
 
 from robot.bus.codec import Codec
-from robot.bus.envelope import Envelope, check_source, pack
+from robot.bus.envelope import Origin, check_source, pack_head, pack_tail
 
 __all__ = ["Outlet", "Wrapped"]
 
@@ -32,17 +32,15 @@ class Outlet(Generic[T]):
     """
 
     def __init__(self, kind: type[T], *, source: str, clock: int, now_ns: Callable[[], int]) -> None:
-        self._codec, self._clock, self._now_ns = Codec(kind), clock, now_ns
-        self._source = check_source(source)
-        self._begun_ns = now_ns()
+        self._codec, self._now_ns = Codec(kind), now_ns
+        self._head = pack_head(
+            Origin(schema=self._codec.schema, clock=clock, begun_ns=now_ns(), source=check_source(source))
+        )
         self._sequence = count()
 
     def wrap(self, message: T, *, stamp_ns: int | None = None) -> Wrapped:
         """Return a message with its envelope, stamped now unless it is known better."""
         stamped_ns = self._now_ns() if stamp_ns is None else stamp_ns
-        encoded = self._codec.encode(message)
-        envelope = Envelope(
-            schema=self._codec.schema, clock=self._clock, begun_ns=self._begun_ns, sequence=next(self._sequence),
-            stamp_ns=stamped_ns, source=self._source, has_words=encoded.has_words,
-        )  # fmt: skip
-        return Wrapped(encoded.payload, pack(envelope) + encoded.beside)
+        payload, beside, has_words = self._codec.encode(message)
+        tail = pack_tail(next(self._sequence), stamped_ns, has_words=has_words)
+        return Wrapped(payload, self._head + tail + beside)

@@ -151,7 +151,7 @@ class Asker(Generic[Q, R]):
 def _read(payload: bytes, attachment: bytes, codec: Codec[Q], *, name: str, reader: str) -> Q:
     try:
         envelope, beside = unpack(attachment)
-        codec.check_schema(envelope, name=name, reader=reader)
+        codec.check_schema(envelope.origin, name=name, reader=reader)
         return codec.decode(payload, beside, has_words=envelope.has_words)
     except MalformedError as error:
         raise MalformedError(f"{name}: {error}") from error

@@ -5,6 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from robot.bus.envelope import HEAD_BYTES
 from robot.bus.errors import MalformedError, SchemaError
 from robot.bus.inlet import MAX_STREAMS, Counts, Inlet
 from robot.bus.outlet import Outlet
@@ -99,6 +100,18 @@ def test_a_good_envelope_around_rubbish_is_malformed_and_its_number_is_not_misse
     reader, writer = inlet(), outlet()
     feed(reader, writer.wrap(level()))
     assert reader.take(writer.wrap(level()).attachment, payload, Time.ns) is None
+    assert feed(reader, writer.wrap(level())) is not None
+    assert reader.counts == Counts(received=3, taken=2, malformed=1)
+
+
+def test_an_envelope_with_a_good_head_and_an_odd_tail_takes_nobody_s_place():
+    reader, time = inlet(), Time()
+    writer = outlet(time=time)
+    feed(reader, writer.wrap(level()))
+    time.ns += 1
+    odd = bytearray(outlet(time=time).wrap(level()).attachment)
+    odd[HEAD_BYTES] = 0x80
+    assert reader.take(bytes(odd), b"", Time.ns) is None
     assert feed(reader, writer.wrap(level())) is not None
     assert reader.counts == Counts(received=3, taken=2, malformed=1)
 
