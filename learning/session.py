@@ -58,8 +58,8 @@ class Session:
         before = self._folder.time_spent() if self.n_done else TimeSpent()
         stopped = (self._folder.stops() if self.n_done else None) or Stops()
 
-        def keep() -> None:
-            self._folder.keep_time_spent(before + self._spent(progress))
+        def keep(spent: TimeSpent) -> None:
+            self._folder.keep_time_spent(spent)
             self._folder.keep_stops(stopped + learner.stops)
 
         self._stopwatch.lap("start-up")
@@ -81,7 +81,7 @@ class Session:
                 watcher=progress,
                 oracle=rules_oracle(self._resolved),
                 stopwatch=self._stopwatch,
-                when_kept=keep,
+                when_kept=lambda: keep(before + self._spent(progress)),
             )
             if state is not None:
                 experiment.restore(state)
@@ -89,7 +89,7 @@ class Session:
         spent = before
         if n_done > self.n_done:
             spent += self._spent(progress)
-            keep()
+            keep(spent)
         return Ended(n_done=n_done, n_epochs=manifest.n_epochs, spent=spent)
 
     def _spent(self, progress: Progress) -> TimeSpent:
