@@ -86,12 +86,13 @@ def test_an_arm_that_is_lost_while_the_table_is_laid_out_is_armed_again(resolved
 
 
 def test_an_arm_that_is_lost_at_every_reset_fails_the_run(resolved, monkeypatch):
-    station = losing(resolved, monkeypatch, 10**6)
+    station, paused_s = losing(resolved, monkeypatch, 10**6), []
     with (
-        OperatedStation(station, build_operator(resolved.rig)) as operated,
+        OperatedStation(station, build_operator(resolved.rig), pause=paused_s.append) as operated,
         pytest.raises(TooManyLatchesError, match="laid out"),
     ):
         operated.reset(seed=1, epoch=0)
+    assert paused_s, "it was tried more than once, not without end"
 
 
 def test_a_reset_without_an_operator_arms_nothing_again(resolved, monkeypatch):

@@ -239,7 +239,7 @@ def test_a_latch_that_comes_just_before_a_time_step_is_asked_for_is_its_end(clie
     client.seed()
     assert stride(client, go(height_m=float("nan"))).verdict.reason == "not_finite"
     told = StrideReply(stride=stride_of(client), is_asked=False)
-    looks = [lambda: None, lambda: client._take_in(told)]
+    looks = [lambda: client._take_in(told)]
     overhear = client._overhear
     monkeypatch.setattr(client, "_overhear", lambda: (looks.pop(0) if looks else overhear)())
     assert stride(client, go()).verdict.reason == "arm_mode"

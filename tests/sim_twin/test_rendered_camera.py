@@ -26,6 +26,8 @@ TRUE = TrueLens(
 )  # fmt: skip
 SPEC = CameraSpec(name="side", serial="7", width_px=640, height_px=480, rate_hz=30.0)
 MS = 1_000_000
+GL = os.environ.get("MUJOCO_GL")
+"""As it was when MuJoCo was imported: a test of a command that draws may set it later, which changes nothing then."""
 
 
 def sheet_at(T_co, T_bc):
@@ -37,7 +39,7 @@ def sheet_at(T_co, T_bc):
 
 
 def camera_on(sheets, T_bc, **optics):
-    if os.environ.get("MUJOCO_GL") not in ("egl", "osmesa"):
+    if GL not in ("egl", "osmesa"):
         pytest.skip(
             "needs MUJOCO_GL=egl or osmesa before MuJoCo is imported; the test below sets it for a process of its own"
         )
@@ -145,7 +147,7 @@ def test_a_lens_is_calibrated_from_rendered_boards_alone():
 
 @pytest.mark.slow
 def test_what_renders_passes_in_a_process_that_may_draw():
-    if os.environ.get("MUJOCO_GL"):
+    if GL:
         pytest.skip("this is such a process")
     command = [sys.executable, "-m", "pytest", "-q", "-rs", "-p", "no:cacheprovider", "-m", "gl", __file__]
     done = subprocess.run(
