@@ -15,7 +15,7 @@ from typing import Any
 import msgspec
 import zenoh
 
-from robot.bus.link import open_link
+from robot.bus.link import on_link, open_link
 from robot.bus.session import Bus
 from robot.bus.topic import Role, Topic
 
@@ -140,7 +140,7 @@ def _listen_raw(endpoint: str, heard: Listening) -> Callable[[], None]:
         assert sample.attachment is not None, "the writer's stamp"
         heard.note(_STAMP.unpack(sample.attachment.to_bytes())[0])
 
-    session.declare_subscriber(RAW_KEY, take)
+    session.declare_subscriber(RAW_KEY, on_link(take))
     return session.close
 
 

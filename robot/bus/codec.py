@@ -1,8 +1,9 @@
 """Messages to bytes and back: the Structs in JSON, a field of bytes beside it as it is.
 
 JSON has no NaN and no infinities, and msgspec writes null for them, which reads as "there is none" or not at all. A
-message that holds one has it in words (NaN, Infinity, -Infinity), and its envelope says so; only such a message is
-read with words allowed in place of numbers. All others are plain.
+message that holds one has it in words that begin with a mark (~NaN, ~Infinity, ~-Infinity), a text of its own that
+begins so has the mark twice, and its envelope says that there are words. All other messages are plain. Words are not
+left to a reader's leniency: that would take any text for a number wherever the type has room for either.
 """
 
 import math
@@ -18,6 +19,9 @@ from robot.bus.errors import MalformedError, SchemaError
 __all__ = ["Codec", "Encoded", "schema_hash"]
 
 T = TypeVar("T", bound=msgspec.Struct)
+
+MARK = "~"
+WORDS = {"NaN": math.nan, "Infinity": math.inf, "-Infinity": -math.inf}
 
 
 class Encoded(NamedTuple):
@@ -46,7 +50,7 @@ class Codec(Generic[T]):
         assert len(blobs) <= 1, f"{kind.__name__}: at most one field of bytes"
         self._blob = blobs[0] if blobs else None
         self._encode = msgspec.json.Encoder().encode
-        self._plain, self._worded = msgspec.json.Decoder(kind), msgspec.json.Decoder(kind, strict=False)
+        self._decode = msgspec.json.Decoder(kind).decode
 
     def encode(self, message: T) -> Encoded:
         """Return a message as it travels, whatever numbers it holds."""
@@ -63,7 +67,7 @@ class Codec(Generic[T]):
         Raises:
             MalformedError: it is none of this type.
         """
-        decode = self._worded.decode if has_words else self._plain.decode
+        decode = self._decode_worded if has_words else self._decode
         try:
             if self._blob is None:
                 return decode(payload)
@@ -82,6 +86,9 @@ class Codec(Generic[T]):
                 f"{name}: expected {self.kind.__name__} with schema {self.schema.hex()} as {reader} has it, got "
                 f"{origin.schema.hex()} from {origin.source}; do both run the same version?"
             )
+
+    def _decode_worded(self, text: bytes) -> T:
+        return msgspec.convert(_in_numbers(msgspec.json.decode(text)), self.kind, str_keys=True)
 
     def _text_of(self, message: object) -> tuple[bytes, bool]:
         text = self._encode(message)
@@ -113,7 +120,9 @@ def _is_prose(key: object, item: object) -> bool:
 def _in_words(value: object) -> tuple[object, bool]:
     """Return plain values with words for what is not finite, and whether there are any."""
     if isinstance(value, float) and not math.isfinite(value):
-        return ("NaN" if math.isnan(value) else "Infinity" if value > 0 else "-Infinity"), True
+        return MARK + ("NaN" if math.isnan(value) else "Infinity" if value > 0 else "-Infinity"), True
+    if isinstance(value, str):
+        return (MARK + value if value.startswith(MARK) else value), False
     if isinstance(value, dict):
         found = {key: _in_words(item) for key, item in value.items()}
         return {key: item for key, (item, _) in found.items()}, any(is_in for _, is_in in found.values())
@@ -121,3 +130,21 @@ def _in_words(value: object) -> tuple[object, bool]:
         items = [_in_words(item) for item in value]
         return [item for item, _ in items], any(is_in for _, is_in in items)
     return value, False
+
+
+def _in_numbers(value: object) -> object:
+    """Return plain values with numbers for their words again.
+
+    Raises:
+        ValueError: a marked text is none of them.
+    """
+    if isinstance(value, str) and value.startswith(MARK):
+        text = value.removeprefix(MARK)
+        if text.startswith(MARK):
+            return text
+        if text not in WORDS:
+            raise ValueError(f"expected one of {', '.join(WORDS)} after {MARK}, got {text[:20]!r}")
+        return WORDS[text]
+    if isinstance(value, dict):
+        return {key: _in_numbers(item) for key, item in value.items()}
+    return [_in_numbers(item) for item in value] if isinstance(value, list) else value

@@ -3,13 +3,17 @@
 import errno
 import json
 import socket
+from collections.abc import Callable
+from typing import TypeVar
 
 import zenoh
 
 from robot.bus.endpoint import Endpoint, on_loopback
 from robot.bus.errors import BusConfigError, BusError
 
-__all__ = ["MAX_MESSAGE_BYTES", "open_link"]
+__all__ = ["MAX_MESSAGE_BYTES", "on_link", "open_link"]
+
+T = TypeVar("T")
 
 CONNECT_MS = 3000
 RETRY = {"period_init_ms": 100, "period_max_ms": 2000, "period_increase_factor": 2}
@@ -59,6 +63,15 @@ def open_link(endpoint: str, *, is_hub: bool, is_by_size: bool = False) -> zenoh
         return zenoh.open(config)
     except zenoh.ZError as error:
         raise BusError(_why_no_hub(parts, error) if is_hub else _why_no_link(parts)) from error
+
+
+def on_link(function: Callable[[T], None]) -> "zenoh.handlers.Callback[T]":
+    """Have a function called on the thread of the link that something came over. It must not wait for the bus.
+
+    Zenoh's default is a Python thread for each function, which the interpreter waits for at its end: a process whose
+    session was left open then never ended.
+    """
+    return zenoh.handlers.Callback(function, indirect=False)
 
 
 def _why_no_hub(endpoint: Endpoint, error: zenoh.ZError) -> str:

@@ -9,6 +9,7 @@ from zenoh import shm
 
 from robot.bus.errors import BusError
 from robot.bus.inlet import Counts, Inlet, Received
+from robot.bus.link import on_link
 from robot.bus.outlet import Outlet
 from robot.bus.topic import Congestion, Topic
 
@@ -80,7 +81,7 @@ class Subscriber(Generic[T]):
         now_ns: Callable[[], int],
     ) -> None:  # fmt: skip
         self._inlet, self._on_message, self._now_ns = inlet, on_message, now_ns
-        self._subscriber = session.declare_subscriber(key, self._take)
+        self._subscriber = session.declare_subscriber(key, on_link(self._take))
 
     @property
     def counts(self) -> Counts:

@@ -1,9 +1,11 @@
 """One process on the bus: who it is, what it may write, and its link to the others."""
 
 from collections.abc import Callable
+from contextlib import suppress
 from time import monotonic_ns
 from types import TracebackType
 from typing import Self, TypeVar
+from weakref import finalize
 
 import msgspec
 import zenoh
@@ -13,7 +15,7 @@ from robot.bus.codec import Codec
 from robot.bus.envelope import check_source
 from robot.bus.errors import BusConfigError, BusError
 from robot.bus.inlet import Inlet, Received
-from robot.bus.link import open_link
+from robot.bus.link import on_link, open_link
 from robot.bus.outlet import Outlet
 from robot.bus.ports import Publisher, Subscriber
 from robot.bus.queries import Answerer, Asker, read_request
@@ -29,6 +31,8 @@ R = TypeVar("R", bound=msgspec.Struct)
 
 class Bus:
     """A typed door to the bus. A link that breaks is made again with growing pauses, and everything goes on over it.
+
+    One that nobody closes leaves when nobody holds it any more, or when the process ends.
 
     Args:
         endpoint: Where the hub listens.
@@ -54,6 +58,7 @@ class Bus:
         self.source = check_source(source or role)
         self.clock = clock_number()
         self._session: zenoh.Session | None = None
+        self._leave: Callable[[], object] | None = None
 
     def __enter__(self) -> Self:
         self.open()
@@ -72,17 +77,16 @@ class Bus:
             BusError: it is taken, or nobody there lets us in.
         """
         if self._session is None:
-            self._session = open_link(self._endpoint, is_hub=self._is_hub)
-            self._answer_pings(self._session)
+            self._session = session = open_link(self._endpoint, is_hub=self._is_hub)
+            self._leave = finalize(self, _leave, session)
+            self._answer_pings(session)
 
     def close(self) -> None:
         """Leave. Idempotent, never raises."""
-        session, self._session = self._session, None
-        if session is not None:
-            try:
-                session.close()
-            except zenoh.ZError:
-                return
+        self._session = None
+        leave, self._leave = self._leave, None
+        if leave is not None:
+            leave()
 
     @property
     def is_linked(self) -> bool:
@@ -158,17 +162,24 @@ class Bus:
             raise BusConfigError(f"{name}: expected to be {how} by {' or '.join(roles)}, {self.source} is {self._role}")
 
     def _answer_pings(self, session: zenoh.Session) -> None:
+        """Answer from now on. What answers must not hold this bus, which could never be let go of then."""
         codec, outlet = Codec(PING.request), self._outlet(PING.reply)
+        source, role, clock, now_ns = self.source, self._role, self.clock, self._now_ns
 
         def answer(query: zenoh.Query) -> None:
             with query:
                 try:
-                    read_request(query, codec, name=PING.name, reader=self.source)
+                    read_request(query, codec, name=PING.name, reader=source)
                 except BusError as error:
                     query.reply_err(str(error))
                     return
-                pong = Pong(source=self.source, role=self._role, clock=self.clock, now_ns=self._now_ns())
+                pong = Pong(source=source, role=role, clock=clock, now_ns=now_ns())
                 payload, attachment = outlet.wrap(pong)
                 query.reply(query.key_expr, payload, attachment=attachment)
 
-        session.declare_queryable(self._key(PING.name), answer)
+        session.declare_queryable(self._key(PING.name), on_link(answer))
+
+
+def _leave(session: zenoh.Session) -> None:
+    with suppress(zenoh.ZError):
+        session.close()

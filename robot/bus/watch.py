@@ -8,6 +8,7 @@ import zenoh
 
 from robot.bus.errors import BusError
 from robot.bus.inlet import Counts, Received
+from robot.bus.link import on_link
 from robot.bus.pace import Pace
 from robot.bus.session import Bus
 from robot.bus.topic import ROOT, Topic
@@ -120,7 +121,7 @@ def survey(bus: Bus, *, seconds: float) -> Seen:
     def note(sample: zenoh.Sample) -> None:
         keys.add(str(sample.key_expr))
 
-    spy = bus.raw().declare_subscriber(f"{ROOT}/**", note)
+    spy = bus.raw().declare_subscriber(f"{ROOT}/**", on_link(note))
     listeners = [Listener(bus, topic) for topic in TOPICS]
     sleep(seconds)
     heard = tuple(listener.heard() for listener in listeners)

@@ -10,7 +10,9 @@ from hypothesis import strategies as st
 __all__ = ["any_of", "is_same"]
 
 INTEGERS = st.integers(-(2**63), 2**63 - 1)
-TEXTS = st.one_of(st.text(max_size=8), st.sampled_from(["NaN", "Infinity", "-Infinity", "null", "1"]))
+TEXTS = st.one_of(
+    st.text(max_size=8), st.sampled_from(["NaN", "Infinity", "-Infinity", "null", "1", "~NaN", "~~", "~-Infinity"])
+)
 
 
 def any_of(kind):

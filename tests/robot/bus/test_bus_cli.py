@@ -79,7 +79,7 @@ def test_echo_prints_messages_with_their_numbers_in_words_where_they_are_not_fin
     first, second = (json.loads(line) for line in result.stdout.splitlines())
     assert second["sequence"] > first["sequence"]
     assert first["source"] == "twin"
-    assert first["message"]["objects"][0]["position_m"] == ["NaN", 0.0, 1.0]
+    assert first["message"]["objects"][0]["position_m"] == ["~NaN", 0.0, 1.0]
     assert "twin " in lab("echo", "twin/truth", "-n", 1).stdout
 
 

@@ -7,10 +7,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from robot.as_came import AsCame, CameField, NonFinite
 from robot.bus.codec import Codec, schema_hash
 from robot.bus.errors import MalformedError
 from robot.bus.topics import QUERIES, TOPICS, TRUTH
-from robot.messages import ObjectPose, SceneState, Verdict
+from robot.messages import ObjectPose, Outcome, SceneState, Verdict
 from tests.support.any_struct import any_of, is_same
 
 KINDS = sorted(
@@ -61,6 +62,24 @@ def test_a_number_that_is_not_finite_survives_and_is_read_as_a_number_only_where
     assert is_same(back, scene)
     with pytest.raises(MalformedError, match=r"position_m"):
         Codec(SceneState).decode(encoded.payload, b"", has_words=False)
+
+
+@pytest.mark.parametrize("words", [NonFinite.NAN, NonFinite.INFINITE, "NaN", "~NaN", "~", "1"])
+def test_a_text_where_a_number_might_be_stays_a_text_beside_a_number_that_is_not_finite(words):
+    numbers = (words, math.inf) if isinstance(words, NonFinite) else (math.inf,)
+    came = AsCame(kind="Twist", fields=(CameField(name="linear_m_s", numbers=numbers, words=str(words)),))
+    verdict = Verdict(stamp_ns=0, sequence=0, outcome=Outcome.REFUSED, amount=math.nan, detail=str(words), refused=came)
+    _, back = there_and_back(verdict)
+    assert is_same(back.refused, came)
+    assert back.detail == words
+    assert math.isnan(back.amount)
+
+
+def test_a_word_that_is_none_is_malformed():
+    encoded, _ = there_and_back(Picture(exposure_s=math.nan, pixels=b""))
+    for wrong in (b"~Nan", b"~", b"~inf", b"~NaN "):
+        with pytest.raises(MalformedError, match="Picture"):
+            Codec(Picture).decode(b"", encoded.beside.replace(b"~NaN", wrong), has_words=True)
 
 
 def test_a_picture_s_bytes_travel_as_they_are_and_the_rest_beside_them():

@@ -1,6 +1,9 @@
 """The bus on real sockets: who may write what, what comes across, links that break, rubbish, and whom to look for."""
 
+import gc
 import socket
+import subprocess
+import sys
 import threading
 import time
 from queue import Empty, SimpleQueue
@@ -222,6 +225,30 @@ def test_an_endpoint_that_is_taken_is_said_to_be(hub, endpoint):
 def test_off_loopback_nothing_is_opened(is_hub):
     with pytest.raises(BusConfigError, match="on loopback"):
         Bus("tcp/0.0.0.0:7447", serial=SERIAL, role=Role.TWIN, is_hub=is_hub).open()
+
+
+LEFT_OPEN = """
+import sys
+from robot.bus import RESET, TRUTH, Bus, Role
+bus = Bus(sys.argv[1], serial=sys.argv[2], role=Role.LEARNING)
+bus.open()
+subscriber, asker = bus.subscriber(TRUTH, print), bus.asker(RESET)
+"""
+
+
+def test_a_process_that_leaves_its_bus_open_ends(hub, endpoint):
+    process = subprocess.run([sys.executable, "-c", LEFT_OPEN, endpoint, SERIAL], timeout=30.0, check=False)
+    assert process.returncode == 0
+
+
+def test_a_bus_that_nobody_holds_any_more_has_left(hub, endpoint):
+    bus = join(endpoint)
+    bus.open()
+    bus.subscriber(TRUTH, print)
+    until(lambda: hub.is_linked)
+    del bus
+    gc.collect()
+    until(lambda: not hub.is_linked, timeout_s=5.0)
 
 
 def test_closing_twice_does_nothing_and_what_is_closed_says_so(hub, endpoint):
