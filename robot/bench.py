@@ -19,7 +19,18 @@ from robot.stdio import STDERR, redirected_stdout
 __all__ = ["BENCH_GROUP", "Bench", "BenchReport", "BenchResult", "bench", "bench_report"]
 
 BENCH_GROUP = "autotelic.benches"
-VERSIONS_OF = ("autotelic", "mujoco", "placo", "ruckig", "torch", "numpy", "msgspec", "ur_rtde")
+VERSIONS_OF = (
+    "autotelic",
+    "mujoco",
+    "placo",
+    "ruckig",
+    "torch",
+    "numpy",
+    "msgspec",
+    "ur_rtde",
+    "eclipse-zenoh",
+    "pyzmq",
+)
 
 
 class BenchResult(msgspec.Struct, frozen=True, kw_only=True):

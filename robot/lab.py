@@ -5,7 +5,7 @@ from pathlib import Path
 from config.limited import limited
 from config.resolved import Resolved
 from config.rig import Rig
-from robot.bus import open_session
+from robot.bus import Bus, Role
 from robot.bus.twin_link import RemoteResetter, RemoteTruth
 from robot.errors import RobotConfigError
 from robot.hal.pendant import Pendant
@@ -58,9 +58,10 @@ def build_lab_station(
         raise RobotConfigError(f"rig {rig.name}: expected the endpoint of its bus, came none")
     if is_driven and rig.reset == "person":
         return _driven_station(resolved, perception)
-    session = open_session(rig.bus, is_hub=False)
-    loop = ServoClient(resolved, when_closed=session.close)
-    truth = RemoteTruth(session, rig.expected.serial)
+    bus = Bus(rig.bus, serial=rig.expected.serial, role=Role.TELEOP if is_driven else Role.LEARNING)
+    bus.open()
+    loop = ServoClient(resolved, when_closed=bus.close)
+    truth = RemoteTruth(bus)
     if rig.reset == "person":
         by_person = PersonResetter(
             scenario=resolved.scenario, loop=loop, scene=truth, person=TerminalPerson(), pictures=pictures
@@ -72,7 +73,7 @@ def build_lab_station(
         )  # fmt: skip
         station.prepare(by_person, resolved.arm.home_rad)
         return station
-    resetter = RemoteResetter(session, rig.expected.serial, loop=loop, truth=truth)
+    resetter = RemoteResetter(bus, loop=loop, truth=truth)
     world = _LabWorld(loop=loop, truth=truth, resetter=resetter)
     return LocalStation(
         world=world, loop=loop, perception=perception, arm=arm, scenario=resolved.scenario, rig=rig,

@@ -290,10 +290,9 @@ class LocalStation:
         return self._result(intent, stride, duration if stride.is_begun else 0.0)
 
     def close(self) -> None:
-        """Stop and release. Idempotent, never raises."""
-        if self._is_connected:
-            self._loop.close()
-            self._is_connected = False
+        """Stop and release, connected to or not: the loop may hold more than an arm. Idempotent, never raises."""
+        self._loop.close()
+        self._is_connected = False
         self._tenure.end()
 
     def _hold_to_grant(self) -> None:

@@ -1,17 +1,20 @@
-"""The one table of topics. Keys are below the serial of the plant that they are about."""
+"""The one table of topics. Keys are below the serial of the plant that they are about.
+
+`virtual_lab` runs on twin/truth, station/reset and twin/cell today; the other rows are there for the processes to come.
+Rates and deadlines are starting points.
+"""
+
+from typing import Any
 
 import msgspec
 
-__all__ = ["CELL", "RESET", "TRUTH", "CellAction", "CellTruth", "ResetRequest", "topic"]
+from robot.bus.topic import Priority, Query, Role, Topic
+from robot.messages import ArmCommand, ArmState, Percept, SceneState, Verdict
 
-TRUTH = "twin/truth"
-"""SceneState in JSON, 100 times a second, by the process that holds the twin."""
-RESET = "station/reset"
-"""Query: a ResetRequest in JSON; answered when the table is laid out, by an empty reply, or by an error in words."""
-
-
-CELL = "twin/cell"
-"""Query: a CellAction in JSON; answered by a CellTruth, or by an error in words."""
+__all__ = [
+    "ARM_STATE", "CELL", "PERCEPT", "PING", "QUERIES", "REQUESTED", "RESET", "SENT", "TOPICS", "TRUTH", "VERDICT",
+    "CellAction", "CellTruth", "Ping", "Pong", "ResetDone", "ResetRequest",
+]  # fmt: skip
 
 
 class CellAction(msgspec.Struct, frozen=True, kw_only=True):
@@ -39,6 +42,65 @@ class ResetRequest(msgspec.Struct, frozen=True, kw_only=True):
     digital_out: int
 
 
-def topic(serial: str, name: str) -> str:
-    """Return the key of a topic of one plant."""
-    return f"autotelic/{serial}/{name}"
+class ResetDone(msgspec.Struct, frozen=True, kw_only=True):
+    """The table is laid out."""
+
+    seed: int
+    epoch: int
+
+
+class Ping(msgspec.Struct, frozen=True, kw_only=True):
+    """Is anybody there?"""
+
+
+class Pong(msgspec.Struct, frozen=True, kw_only=True):
+    """Somebody is."""
+
+    source: str
+    role: Role
+    clock: int
+    """Processes with the same number have the same monotonic clock: they run on one machine."""
+    now_ns: int
+    """Of that clock."""
+
+
+ARM_STATE = Topic(
+    name="arm/state", kind=ArmState, writers=(Role.ROBOT,), rate_hz=50.0, deadline_s=0.06, priority=Priority.REAL_TIME
+)
+REQUESTED = Topic(
+    name="command/requested", kind=ArmCommand, writers=(Role.ROBOT,), rate_hz=50.0, deadline_s=0.06,
+    priority=Priority.DATA_HIGH,
+)  # fmt: skip
+SENT = Topic(
+    name="command/sent", kind=ArmCommand, writers=(Role.ROBOT,), rate_hz=50.0, deadline_s=0.06,
+    priority=Priority.DATA_HIGH,
+)  # fmt: skip
+VERDICT = Topic(
+    name="verdict", kind=Verdict, writers=(Role.ROBOT,), rate_hz=50.0, deadline_s=0.06, priority=Priority.DATA_HIGH
+)
+TRUTH = Topic(
+    name="twin/truth", kind=SceneState, writers=(Role.TWIN,), rate_hz=100.0, deadline_s=0.1, priority=Priority.DATA_HIGH
+)
+PERCEPT = Topic(
+    name="percept", kind=Percept, writers=(Role.PERCEPTION,), rate_hz=30.0, deadline_s=0.15,
+    priority=Priority.INTERACTIVE_HIGH,
+)  # fmt: skip
+
+RESET = Query(
+    name="station/reset", request=ResetRequest, reply=ResetDone, answered_by=(Role.TWIN,),
+    asked_by=(Role.ROBOT, Role.LEARNING, Role.TELEOP), answer_s=20.0,
+)  # fmt: skip
+"""Answered when the table is laid out, or by an error in words."""
+CELL = Query(
+    name="twin/cell",
+    request=CellAction,
+    reply=CellTruth,
+    answered_by=(Role.TWIN,),
+    asked_by=(Role.ROBOT,),
+    answer_s=5.0,
+)
+PING = Query(name="bus/ping", request=Ping, reply=Pong, answered_by=tuple(Role), asked_by=tuple(Role), answer_s=1.0)
+"""Answered by every process on the bus."""
+
+TOPICS: tuple[Topic[Any], ...] = (ARM_STATE, REQUESTED, SENT, VERDICT, TRUTH, PERCEPT)
+QUERIES: tuple[Query[Any, Any], ...] = (RESET, CELL, PING)

@@ -5,16 +5,15 @@ from collections.abc import Callable
 from types import TracebackType
 from typing import Self
 
-import msgspec
-import zenoh
-
-from robot.bus.session import BusError, open_session
-from robot.bus.topics import CELL, CellAction, CellTruth, topic
+from robot.bus.queries import Asker
+from robot.bus.session import Bus
+from robot.bus.topic import Role
+from robot.bus.topics import CELL, CellAction, CellTruth
 from robot.cell_check import Wire
 
 __all__ = ["VirtualSomebody"]
 
-ANSWER_S, ACT_S, LOOK_S, POLL_S = 5.0, 1.0, 3.0, 0.05
+ACT_S, LOOK_S, POLL_S = 1.0, 3.0, 0.05
 OPEN_SHARE, SHUT_SHARE = 0.9, 0.05
 
 
@@ -27,8 +26,8 @@ class VirtualSomebody:
     """
 
     def __init__(self, endpoint: str, serial: str) -> None:
-        self._endpoint, self._key = endpoint, topic(serial, CELL)
-        self._session: zenoh.Session | None = None
+        self._bus = Bus(endpoint, serial=serial, role=Role.ROBOT, source="somebody")
+        self._asker: Asker[CellAction, CellTruth] | None = None
 
     def __enter__(self) -> Self:
         """Join the bus.
@@ -36,14 +35,14 @@ class VirtualSomebody:
         Raises:
             BusError: nobody listens there.
         """
-        self._session = open_session(self._endpoint, is_hub=False)
+        self._bus.open()
+        self._asker = self._bus.asker(CELL)
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        if self._session is not None:
-            self._session.close()
+        self._bus.close()
 
     def press(self, wire: Wire, is_changed: Callable[[], bool]) -> None:
         """Press the button, or put a thing into the box."""
@@ -77,15 +76,8 @@ class VirtualSomebody:
         self._ask(CellAction(name=wire.name, is_on=is_on))
 
     def _ask(self, action: CellAction) -> CellTruth:
-        assert self._session is not None, "entered"
-        replies = list(self._session.get(self._key, payload=msgspec.json.encode(action), timeout=ANSWER_S))
-        if not replies:
-            raise BusError(f"{self._key}: expected an answer within {ANSWER_S:g} s, none came; does the twin run?")
-        ok, error = replies[0].ok, replies[0].err
-        if ok is None:
-            said = "an error" if error is None else error.payload.to_string()
-            raise BusError(f"{self._key}: {said}")
-        return msgspec.json.decode(ok.payload.to_bytes(), type=CellTruth)
+        assert self._asker is not None, "entered"
+        return self._asker.ask(action)
 
 
 def _await(is_there: Callable[[], bool], timeout_s: float) -> bool:

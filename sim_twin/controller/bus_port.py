@@ -6,13 +6,7 @@ A reset waits a second for a program that is ending and an arm that is coming to
 answered with an error before anything else: it unlocks and ends nothing.
 """
 
-from typing import NamedTuple
-
-import msgspec
-import zenoh
-
-from robot.bus import CELL, RESET, TRUTH, CellAction, ResetRequest, open_session, topic
-from robot.messages import SceneState
+from robot.bus import CELL, RESET, TRUTH, Asked, Bus, CellAction, CellTruth, ResetDone, ResetRequest, Role
 from sim_twin.controller.robot import VirtualRobot
 from sim_twin.controller.table_hands import TableHands
 from sim_twin.controller.wire.dashboard_target import Outcome
@@ -21,14 +15,11 @@ from sim_twin.plant import TwinTruth
 __all__ = ["BusPort"]
 
 TRUTH_SLICES = 5
-N_WAITING = 8
 PATIENCE_SLICES = 500
 """How long a program may take to end, and the arm to come to rest, once a reset was asked for."""
 
 
-class _Reset(NamedTuple):
-    query: zenoh.Query
-    request: ResetRequest
+_Reset = Asked[ResetRequest, ResetDone]
 
 
 class BusPort:
@@ -46,19 +37,14 @@ class BusPort:
         self._robot = robot
         self._truth = TwinTruth(robot.machine.world)
         serial = robot.panel.status().serial_number
-        self._key = topic(serial, RESET)
-        self._session = open_session(endpoint, is_hub=True)
-        self._publisher = self._session.declare_publisher(
-            topic(serial, TRUTH), congestion_control=zenoh.CongestionControl.DROP, express=True
-        )
-        self._queries = self._session.declare_queryable(self._key, zenoh.handlers.FifoChannel(N_WAITING))
-        self._cell_key = topic(serial, CELL)
-        self._actions = self._session.declare_queryable(self._cell_key, zenoh.handlers.FifoChannel(N_WAITING))
+        self._bus = Bus(endpoint, serial=serial, role=Role.TWIN, is_hub=True)
+        self._bus.open()
+        self._publisher = self._bus.publisher(TRUTH)
+        self._resets, self._actions = self._bus.answerer(RESET), self._bus.answerer(CELL)
         self._hands = TableHands(robot.machine.world)
         self._n_patience = 0
         self._asked: _Reset | None = None
         """A reset that waits for the arm to be unlocked, or to come to rest."""
-        self._encode = msgspec.json.Encoder().encode
 
     @property
     def is_waiting(self) -> bool:
@@ -69,33 +55,18 @@ class BusPort:
         """Answer what was asked, and publish when it is time."""
         reset, self._asked = self._asked, None
         if reset is None:
-            reset, self._n_patience = self._next_reset(), PATIENCE_SLICES
+            reset, self._n_patience = self._resets.next(), PATIENCE_SLICES
         if reset is not None:
             self._answer(reset)
-        action = self._actions.try_recv()
+        action = self._actions.next()
         if action is not None:
             self._act(action)
         if n_slices % TRUTH_SLICES == 0:
-            self._publisher.put(self._encode(self._read()))
+            self._publisher.put(self._truth.read())
 
     def close(self) -> None:
         """Leave the bus. Idempotent."""
-        self._session.close()
-
-    def _read(self) -> SceneState:
-        return self._truth.read()
-
-    def _next_reset(self) -> _Reset | None:
-        """Return what was asked next, None where nothing was or where it was garbage, which is answered here."""
-        query = self._queries.try_recv()
-        if query is None:
-            return None
-        try:
-            return _Reset(query, msgspec.json.decode(_payload(query), type=ResetRequest))
-        except (msgspec.DecodeError, ValueError) as error:
-            with query:
-                query.reply_err(f"reset: {error}")
-            return None
+        self._bus.close()
 
     def _answer(self, reset: _Reset) -> None:
         robot, modes = self._robot, self._robot.machine.modes
@@ -109,27 +80,21 @@ class BusPort:
             self._asked = reset
             self._n_patience -= 1
             return
-        query, asked = reset
-        with query:
-            try:
-                robot.lay_out(seed=asked.seed, epoch=asked.epoch, digital_out=asked.digital_out)
-            except ValueError as error:
-                query.reply_err(f"reset: {error}")
-            else:
-                self._hands.let_go()
-                query.reply(self._key, b"")
+        asked = reset.request
+        try:
+            robot.lay_out(seed=asked.seed, epoch=asked.epoch, digital_out=asked.digital_out)
+        except ValueError as error:
+            reset.refuse(f"reset: {error}")
+        else:
+            self._hands.let_go()
+            reset.answer(ResetDone(seed=asked.seed, epoch=asked.epoch))
 
-    def _act(self, query: zenoh.Query) -> None:
-        with query:
-            try:
-                asked = msgspec.json.decode(_payload(query), type=CellAction)
-                if asked.name:
-                    self._hands.act(asked.name, is_on=asked.is_on)
-            except (msgspec.DecodeError, ValueError) as error:
-                query.reply_err(f"cell: {error}")
-            else:
-                query.reply(self._cell_key, self._encode(self._hands.look()))
-
-
-def _payload(query: zenoh.Query) -> bytes:
-    return b"" if query.payload is None else query.payload.to_bytes()
+    def _act(self, action: Asked[CellAction, CellTruth]) -> None:
+        asked = action.request
+        try:
+            if asked.name:
+                self._hands.act(asked.name, is_on=asked.is_on)
+        except ValueError as error:
+            action.refuse(f"cell: {error}")
+        else:
+            action.answer(self._hands.look())

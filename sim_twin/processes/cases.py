@@ -1,22 +1,22 @@
 """What befalls the processes that move an arm, and what is expected of each case."""
 
+import json
 import os
 import signal
 from collections.abc import Callable
 from contextlib import suppress
-from time import monotonic, sleep
+from time import monotonic
 from typing import Any
 
 import msgspec
 import zenoh
 
-from robot.bus import RESET, TRUTH, open_session, topic
+from robot.bus import RESET, TRUTH, key_of
 from sim_twin.processes.commander import CommanderProcess, Order
 from sim_twin.processes.relay import Relay
 
 __all__ = ["CASES", "Case", "Stage"]
 
-GARBAGE_S, GARBAGE_EVERY_S = 0.3, 0.001
 SOMEBODY = (
     b"\x00\xff garbage", b"{}", b'{"stamp_ns": 0, "objects": "none"}', b"[" * 2000, b'{"stamp_ns": NaN, "objects": []}',
 )  # fmt: skip
@@ -33,7 +33,12 @@ class Stage(msgspec.Struct, frozen=True, kw_only=True):
 
     def session(self) -> zenoh.Session:
         """Join the bus as anybody can who reaches it."""
-        return open_session(self.endpoint, is_hub=False)
+        config = zenoh.Config()
+        config.insert_json5("mode", '"client"')
+        config.insert_json5("scouting/multicast/enabled", "false")
+        config.insert_json5("scouting/gossip/enabled", "false")
+        config.insert_json5("connect/endpoints", json.dumps([self.endpoint]))
+        return zenoh.open(config)
 
     def signal(self, number: signal.Signals, *, servo: bool = False, commander: bool = True) -> float:
         """Send a signal and return when it was (s, the host's monotonic time)."""
@@ -93,27 +98,15 @@ def _thaw(stage: Stage) -> None:
         stage.signal(signal.SIGCONT, servo=True, commander=False)
 
 
-def _litter(stage: Stage) -> float:
-    """Publish garbage as the truth, between the true messages."""
-    key = topic(stage.serial, TRUTH)
-    with stage.session() as session:
-        at_s = monotonic()
-        while monotonic() < at_s + GARBAGE_S:
-            for raw in SOMEBODY:
-                session.put(key, raw)
-                sleep(GARBAGE_EVERY_S)
-    return at_s
-
-
 def besiege(stage: Stage) -> None:
     """Ask for motion, arming and the lease over the bus, in every way that somebody might believe in."""
     words = (*SOMEBODY, b'{"type":"Twist","linear_m_s":[0.0,0.3,0.0]}', b'{"by":"the bus","answer":"AAAA"}', b"arm")
     with stage.session() as session:
-        for name in ("intent/learning", "intent/teleop", "arming", "lease", "station/arm", TRUTH + "/intent"):
+        for name in ("intent/learning", "intent/teleop", "arming", "lease", "station/arm", TRUTH.name, "twin/intent"):
             for word in words:
-                session.put(topic(stage.serial, name), word)
+                session.put(key_of(stage.serial, name), word)
         for word in SOMEBODY:
-            list(session.get(topic(stage.serial, RESET), payload=word, timeout=1.0))
+            list(session.get(key_of(stage.serial, RESET.name), payload=word, timeout=1.0))
 
 
 CASES: tuple[Case, ...] = (
@@ -137,7 +130,6 @@ CASES: tuple[Case, ...] = (
     Case(
         name="both_frozen_1s", begin=_by_signal(signal.SIGSTOP, servo=True), end=_thaw, hold_s=1.0,
     ),
-    Case(name="truth_garbage", begin=_litter, is_sudden=False),
     Case(name="bus_cut", begin=_cut, end=_mend, is_sudden=False, hold_s=1.0, is_brief=True),
     Case(name="commander_killed", begin=_by_signal(signal.SIGKILL), is_deadly=True, is_brief=True),
     Case(

@@ -7,13 +7,12 @@ import signal
 import subprocess
 import time
 
-import msgspec
 import numpy as np
 import pytest
 
 from config.loader import load_arm
 from learning.run_folder import RunFolder
-from robot.bus import RESET, ResetRequest, open_session, topic
+from robot.bus import RESET, Bus, ResetRequest, Role
 from tests.support.small_lab import SERIAL, autotelic, children_of, controller_of, make_lab, start
 
 pytestmark = pytest.mark.realtime
@@ -192,7 +191,8 @@ def test_a_person_lays_the_table_out_while_the_arm_is_parked_and_disarmed(lab_by
     folder, controller, host = lab_by_person
     home = np.array(load_arm("ur5e").home_rad)
     process = start(folder, *learn("run", "--epochs", "1"), stdin=subprocess.PIPE)
-    session = open_session(f"tcp/{host}:7447", is_hub=False)
+    bus = Bus(f"tcp/{host}:7447", serial=SERIAL, role=Role.LEARNING, source="hand")
+    bus.open()
     said, parked_rad = [], []
     try:
         for line in process.stderr:
@@ -207,9 +207,7 @@ def test_a_person_lays_the_table_out_while_the_arm_is_parked_and_disarmed(lab_by
                 assert (folder / asked[3]).read_bytes()[:4] == b"\x89PNG"
                 last = asked
             elif "put right" in line:
-                payload = msgspec.json.encode(ResetRequest(seed=int(last[2]), epoch=int(last[1]), digital_out=0))
-                (reply,) = session.get(topic(SERIAL, RESET), payload=payload, timeout=10.0)
-                assert reply.err is None
+                bus.asker(RESET).ask(ResetRequest(seed=int(last[2]), epoch=int(last[1]), digital_out=0))
                 time.sleep(0.1)
             process.stdin.write("\n")
             process.stdin.flush()
@@ -217,7 +215,7 @@ def test_a_person_lays_the_table_out_while_the_arm_is_parked_and_disarmed(lab_by
     finally:
         process.kill()
         process.communicate()
-        session.close()
+        bus.close()
     text = "".join(said)
     assert code == 0, text
     assert "robot-hours: at most" in text

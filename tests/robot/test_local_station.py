@@ -4,6 +4,7 @@ import pytest
 
 from robot.errors import NotEngagedError, StaleStateError
 from robot.messages import ArmMode, Grip, GripState, Heading, Hold, StationMode
+from robot.rigs import build_station
 from tests.support.stations import engaged as engage_fake
 from tests.support.stations import fake_rig
 
@@ -46,6 +47,15 @@ def test_an_arm_that_falls_silent_latches_and_voids_the_step(fake):
     assert result.is_void
     assert result.verdicts[0].reason == "stale_state"
     assert plant.arm.n_stops > 0
+
+
+def test_a_station_that_never_connected_lets_go_of_what_its_loop_holds(monkeypatch):
+    resolved = fake_rig()
+    station = build_station(resolved)
+    n_closed = []
+    monkeypatch.setattr(station.loop, "close", lambda: n_closed.append(1))
+    station.close()
+    assert n_closed == [1]
 
 
 def test_a_table_that_cannot_be_seen_when_the_arm_is_taken_latches_it(fake, monkeypatch):

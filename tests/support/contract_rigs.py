@@ -88,14 +88,13 @@ class LockStepWorld:
 class WirePlant:
     """The plant of a rig with a bus, whole in one process: the arm at its address, truth and resets over the bus."""
 
-    def __init__(self, resolved, session):
+    def __init__(self, resolved, bus):
         from robot.bus.twin_link import RemoteResetter, RemoteTruth
 
         self._plant = build_plant(rig=resolved.rig, arm=resolved.arm, scenario=resolved.scenario)
         self.arm, self.cameras = self._plant.arm, self._plant.cameras
-        serial = resolved.rig.expected.serial
-        self.truth = RemoteTruth(session, serial)
-        self.resetter = RemoteResetter(session, serial, loop=self.arm, truth=self.truth)
+        self.truth = RemoteTruth(bus)
+        self.resetter = RemoteResetter(bus, loop=self.arm, truth=self.truth)
 
     @property
     def identity(self):
@@ -124,12 +123,11 @@ class WireWorld:
         self.controller = self._open.enter_context(ControllerProcess(Setup(host=host, bus=rig.bus)))
 
     @cached_property
-    def _session(self):
-        from robot.bus import open_session
+    def _bus(self):
+        from robot.bus import Bus, Role
 
-        session = open_session(self.resolved.rig.bus, is_hub=False)
-        self._open.callback(session.close)
-        return session
+        rig = self.resolved.rig
+        return self._open.enter_context(Bus(rig.bus, serial=rig.expected.serial, role=Role.LEARNING))
 
     @cached_property
     def _plant(self):
@@ -151,7 +149,7 @@ class WireWorld:
         return station
 
     def fresh(self):
-        return WirePlant(self.resolved, self._session)
+        return WirePlant(self.resolved, self._bus)
 
     def plant(self):
         self._plant.arm.connect()

@@ -4,11 +4,13 @@ import socket
 import time
 from queue import SimpleQueue
 
-import msgspec
 import numpy as np
 import pytest
 
-from robot.bus import RESET, ResetRequest, open_session, topic
+from robot.bus import RESET, Bus, ResetRequest, Role
+from robot.bus.outlet import Outlet
+from robot.bus.topic import key_of
+from robot.bus.topics import CellAction
 from sim_twin.controller.bus_port import PATIENCE_SLICES, BusPort
 from sim_twin.controller.states import Event, RuntimeState
 from tests.support.virtual_robot import make_robot, run
@@ -19,7 +21,13 @@ MOVES = "def f():\n q = get_actual_joint_positions()\n q[0] = q[0] + 0.2\n movej
 FOREVER = "def waits():\n  while True:\n    sync()\n  end\nend\n"
 SLICES_AT_MOST = 1500
 UNLOCKABLE_SLICES = 2600
-RESET_3 = msgspec.json.encode(ResetRequest(seed=3, epoch=1, digital_out=0))
+
+
+def wrapped(message):
+    return Outlet(type(message), source="asker", clock=0, now_ns=time.monotonic_ns).wrap(message)
+
+
+RESET_3 = wrapped(ResetRequest(seed=3, epoch=1, digital_out=0))
 
 
 class Cell:
@@ -28,9 +36,10 @@ class Cell:
     def __init__(self, endpoint):
         self.robot = make_robot()
         self.port = BusPort(self.robot, endpoint)
-        self.asker = open_session(endpoint, is_hub=False)
-        self.key = topic(self.robot.panel.status().serial_number, RESET)
-        self.n = 0
+        serial = self.robot.panel.status().serial_number
+        self.asker = Bus(endpoint, serial=serial, role=Role.LEARNING, source="asker")
+        self.asker.open()
+        self.key = key_of(serial, RESET.name)
 
     def start(self, text):
         self.robot.submit_script(text)
@@ -40,10 +49,11 @@ class Cell:
     def runtime(self):
         return self.robot.machine.modes.runtime
 
-    def ask(self, payload=RESET_3):
+    def ask(self, question=RESET_3):
         """Ask, and let slices pass once the port has the question; return what came and after how many slices."""
         replies = SimpleQueue()
-        self.asker.get(self.key, replies.put, payload=payload, timeout=20.0)
+        payload, attachment = question
+        self.asker.raw().get(self.key, replies.put, payload=payload, attachment=attachment, timeout=20.0)
         end = time.monotonic() + 10.0
         while not self.port.is_waiting and replies.empty():
             assert time.monotonic() < end
@@ -114,7 +124,16 @@ def test_what_is_no_reset_request_is_refused_and_neither_unlocks_a_stop_nor_ends
     run(cell.robot, UNLOCKABLE_SLICES)
     modes = cell.robot.machine.modes
     before = (modes.safety, modes.runtime)
-    for garbage in (b"", b"reset", b"[1, 2]", b'{"seed": "three", "epoch": 0, "digital_out": 0}', b"\xff\xfe"):
+    for garbage in (
+        (b"", b""),
+        (b"reset", RESET_3.attachment),
+        (b"[1, 2]", RESET_3.attachment),
+        (b'{"seed": "three", "epoch": 0, "digital_out": 0}', RESET_3.attachment),
+        (b"\xff\xfe", RESET_3.attachment),
+        (RESET_3.payload, b""),
+        (RESET_3.payload, RESET_3.attachment[:-1]),
+        (RESET_3.payload, wrapped(CellAction()).attachment),
+    ):
         reply, n = cell.ask(garbage)
         assert "reset: " in reply.err.payload.to_string()
         assert n == 0

@@ -21,7 +21,6 @@ REASONS = {
     "lease_of_another": "it was armed for",
     "servo_process_killed": "stale_state",
     "servo_process_frozen": "stale_state",
-    "truth_garbage": "stale_state",
     "bus_cut": "stale_state",
 }
 
