@@ -219,7 +219,9 @@ def _named_by(rig: Source, key: str, folder: str, name: str) -> Source:
 def _load_rig(source: Source) -> Rig:
     rig = _decode(source, Rig)
     check_rig(rig, source.file)
-    return rig
+    if rig.keys is None or source.folder is None:
+        return rig
+    return msgspec.structs.replace(rig, keys=str(source.folder.resolve() / Path(rig.keys).expanduser()))
 
 
 def _load_learning(source: Source) -> LearningConfig:

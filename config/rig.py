@@ -47,8 +47,10 @@ class Rig(Section, frozen=True, kw_only=True):
     """Who lays the table out: the twin's process, or a person whom the arm waits for."""
     address: Annotated[str, Meta(pattern=r"^[A-Za-z0-9._:-]{1,253}\Z")] | None = None
     """Host or IP address of the arm's controller, where it has one."""
-    bus: Annotated[str, Meta(pattern=r"^(tcp|unixsock-stream)/[A-Za-z0-9._:/-]{1,200}\Z")] | None = None
+    bus: Annotated[str, Meta(pattern=r"^(tcp|tls|unixsock-stream)/[A-Za-z0-9._:/-]{1,200}\Z")] | None = None
     """Zenoh endpoint where the twin's process listens; with it the arm is held by a servo process of its own."""
+    keys: Annotated[str, Meta(min_length=1, max_length=500)] | None = None
+    """Folder of certificates (`autotelic keys`) for a bus at tls/HOST:PORT, from the rig's file on."""
     expected: PlantExpected
     tick_s: Annotated[float, Meta(ge=0.002, le=0.05)] = 0.01
     physics_s: Annotated[float, Meta(ge=0.0005, le=0.01)] = 0.002

@@ -145,7 +145,7 @@ def _truth_of(rig: Rig) -> "AbstractContextManager[Somebody]":
         )
     from robot.bus.virtual_table import VirtualSomebody  # brings the bus, which a person's walk does not need
 
-    return VirtualSomebody(rig.bus, rig.expected.serial)
+    return VirtualSomebody(rig.bus, rig.expected.serial, keys=rig.keys)
 
 
 def _table(findings: list[Finding]) -> Table:

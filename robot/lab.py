@@ -58,7 +58,9 @@ def build_lab_station(
         raise RobotConfigError(f"rig {rig.name}: expected the endpoint of its bus, came none")
     if is_driven and rig.reset == "person":
         return _driven_station(resolved, perception)
-    bus = Bus(rig.bus, serial=rig.expected.serial, role=Role.TELEOP if is_driven else Role.LEARNING)
+    bus = Bus(
+        rig.bus, serial=rig.expected.serial, role=Role.TELEOP if is_driven else Role.LEARNING, keys=rig.keys
+    )  # fmt: skip
     bus.open()
     loop = ServoClient(resolved, when_closed=bus.close)
     truth = RemoteTruth(bus)

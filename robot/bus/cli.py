@@ -154,7 +154,7 @@ def _joined(rig_name: str, endpoint: str) -> Iterator[Bus]:
         raise RobotConfigError(f"rig {rig.name}: expected a bus, it has none: its processes are one")
     if not serial:
         raise RobotConfigError(f"rig {rig.name}: expected expected.serial, not filled in yet: topics are below it")
-    with Bus(where, serial=serial, role=Role.VIEWER) as joined:
+    with Bus(where, serial=serial, role=Role.VIEWER, keys=rig.keys) as joined:
         yield joined
 
 

@@ -8,8 +8,9 @@ from typing import TypeVar
 
 import zenoh
 
-from robot.bus.endpoint import Endpoint, on_loopback
+from robot.bus.endpoint import Endpoint, safe_endpoint
 from robot.bus.errors import BusConfigError, BusError
+from robot.bus.keys.guard import Guard
 
 __all__ = ["MAX_MESSAGE_BYTES", "on_link", "open_link"]
 
@@ -22,7 +23,7 @@ MAX_MESSAGE_BYTES = 1 << 24
 PROBE_S = 0.5
 
 
-def open_link(endpoint: str, *, is_hub: bool, is_by_size: bool = False) -> zenoh.Session:
+def open_link(endpoint: str, *, is_hub: bool, is_by_size: bool = False, guard: Guard | None = None) -> zenoh.Session:
     """Open a session on one endpoint, such as tcp/127.0.0.1:7447, without scouting.
 
     Zenoh's defaults listen on every interface and scout by multicast; and a peer does not forward between two others.
@@ -32,12 +33,13 @@ def open_link(endpoint: str, *, is_hub: bool, is_by_size: bool = False) -> zenoh
         endpoint: where the hub listens.
         is_hub: this process is the hub.
         is_by_size: every large message goes through shared memory, as it does by Zenoh's defaults.
+        guard: certificates, and at the hub who may do what; without one the endpoint is on loopback.
 
     Raises:
-        BusConfigError: it is no endpoint, or not on loopback.
+        BusConfigError: it is no endpoint, or others could reach it.
         BusError: the endpoint is taken, or nobody there lets us in within 3 s.
     """
-    parts = on_loopback(endpoint)
+    parts = safe_endpoint(endpoint, has_keys=guard is not None)
     here, nowhere = [endpoint], []
     settings: dict[str, object] = {
         "mode": "router" if is_hub else "client",
@@ -53,6 +55,8 @@ def open_link(endpoint: str, *, is_hub: bool, is_by_size: bool = False) -> zenoh
         # Topics that are for shared memory allocate there (robot.bus.ports); none goes there by its mere size.
         "transport/shared_memory/transport_optimization/enabled": is_by_size,
     }
+    if guard is not None:
+        settings |= guard.settings
     config = zenoh.Config()
     try:
         for key, value in settings.items():
@@ -92,6 +96,7 @@ def _why_no_link(endpoint: Endpoint) -> str:
             f"bus: expected the hub at {endpoint.text} to let us in; somebody listens there and did not, within "
             f"{CONNECT_MS / 1e3:g} s: another program, another version, a hub that hangs, or one that refuses us "
             "(these cannot be told apart from here); see what listens with `ss -ltnp`"
+            + (", and `autotelic keys list` where the hub is" if endpoint.is_tls else "")
         )
     if came in (errno.ECONNREFUSED, errno.ENOENT):
         return (

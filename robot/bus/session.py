@@ -2,6 +2,8 @@
 
 from collections.abc import Callable
 from contextlib import suppress
+from datetime import UTC, datetime
+from pathlib import Path
 from time import monotonic_ns
 from types import TracebackType
 from typing import Self, TypeVar
@@ -15,6 +17,7 @@ from robot.bus.codec import Codec
 from robot.bus.envelope import check_source
 from robot.bus.errors import BusConfigError, BusError
 from robot.bus.inlet import Inlet, Received
+from robot.bus.keys.guard import Guard, guard_of
 from robot.bus.link import on_link, open_link
 from robot.bus.outlet import Outlet
 from robot.bus.ports import Publisher, Subscriber
@@ -40,6 +43,7 @@ class Bus:
         role: What this process is for; it may write and answer what the table says this role does.
         source: Its name, by which others tell it from the rest; its role's where it is not given.
         is_hub: The others link to this process.
+        keys: Folder of certificates, for an endpoint that asks for them.
         now_ns: This machine's monotonic clock.
 
     Attributes:
@@ -50,9 +54,9 @@ class Bus:
 
     def __init__(
         self, endpoint: str, *, serial: str, role: Role, source: str = "", is_hub: bool = False,
-        now_ns: Callable[[], int] = monotonic_ns,
+        keys: str | None = None, now_ns: Callable[[], int] = monotonic_ns,
     ) -> None:  # fmt: skip
-        self._endpoint, self._is_hub = endpoint, is_hub
+        self._endpoint, self._is_hub, self._keys = endpoint, is_hub, keys
         self.serial = serial
         self._role, self._now_ns = role, now_ns
         self.source = check_source(source or role)
@@ -73,11 +77,11 @@ class Bus:
         """Listen, as the hub, or join; a second call does nothing.
 
         Raises:
-            BusConfigError: the endpoint is none, or off loopback.
+            BusConfigError: the endpoint is none, or others could reach it; a certificate is missing or over.
             BusError: it is taken, or nobody there lets us in.
         """
         if self._session is None:
-            self._session = session = open_link(self._endpoint, is_hub=self._is_hub)
+            self._session = session = open_link(self._endpoint, is_hub=self._is_hub, guard=self._guard())
             self._leave = finalize(self, _leave, session)
             self._answer_pings(session)
 
@@ -145,6 +149,11 @@ class Bus:
             BusError: the bus is not open.
         """
         return self._opened()
+
+    def _guard(self) -> Guard | None:
+        if self._keys is None:
+            return None
+        return guard_of(Path(self._keys), self.source, is_hub=self._is_hub, now=datetime.now(UTC))
 
     def _outlet(self, kind: type[T]) -> Outlet[T]:
         return Outlet(kind, source=self.source, clock=self.clock, now_ns=self._now_ns)

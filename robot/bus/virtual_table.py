@@ -23,10 +23,11 @@ class VirtualSomebody:
     Args:
         endpoint: Of the bus.
         serial: Of the virtual controller.
+        keys: Folder of certificates, for an endpoint that asks for them.
     """
 
-    def __init__(self, endpoint: str, serial: str) -> None:
-        self._bus = Bus(endpoint, serial=serial, role=Role.ROBOT, source="somebody")
+    def __init__(self, endpoint: str, serial: str, *, keys: str | None = None) -> None:
+        self._bus = Bus(endpoint, serial=serial, role=Role.ROBOT, source="somebody", keys=keys)
         self._asker: Asker[CellAction, CellTruth] | None = None
 
     def __enter__(self) -> Self:

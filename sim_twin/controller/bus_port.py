@@ -28,16 +28,17 @@ class BusPort:
     Args:
         robot: Whose table it is.
         endpoint: Where to listen, such as tcp/127.0.0.2:7447.
+        keys: Folder of certificates and their ledger, for an endpoint that asks for them.
 
     Raises:
         BusError: the endpoint is taken.
     """
 
-    def __init__(self, robot: VirtualRobot, endpoint: str) -> None:
+    def __init__(self, robot: VirtualRobot, endpoint: str, *, keys: str | None = None) -> None:
         self._robot = robot
         self._truth = TwinTruth(robot.machine.world)
         serial = robot.panel.status().serial_number
-        self._bus = Bus(endpoint, serial=serial, role=Role.TWIN, is_hub=True)
+        self._bus = Bus(endpoint, serial=serial, role=Role.TWIN, is_hub=True, keys=keys)
         self._bus.open()
         self._publisher = self._bus.publisher(TRUTH)
         self._resets, self._actions = self._bus.answerer(RESET), self._bus.answerer(CELL)

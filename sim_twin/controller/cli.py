@@ -25,6 +25,7 @@ def controller(
     bus: Annotated[
         str, typer.Option("--bus", help="Zenoh endpoint for truth and resets, e.g. tcp/127.0.0.2:7447.")
     ] = "",
+    keys: Annotated[str, typer.Option("--keys", help="Folder of certificates, for a bus at tls/HOST:PORT.")] = "",
     cell: Annotated[
         str, typer.Option("--cell", help="How the table is wired to the control box: a shipped cell's name or a file.")
     ] = "ur_box",
@@ -68,6 +69,7 @@ def controller(
             script=text,
             shelf={path.name: path.read_text(encoding="utf-8") for path in program or []},
             bus=bus,
+            keys=keys,
             cell=cell,
             planes=tuple(map(parse_plane, plane or [])),
             safety_inputs=dict(map(parse_safety_input, safety_input or [])),

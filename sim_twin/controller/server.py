@@ -63,6 +63,8 @@ class Setup(msgspec.Struct, frozen=True, kw_only=True):
     """Safety planes of the installation: normal (base frame) and offset along it (m); the tool stays on its side."""
     bus: str = ""
     """Zenoh endpoint to listen on: the twin's truth, and resets of its table."""
+    keys: str = ""
+    """Folder of certificates and their ledger, for an endpoint that others can reach."""
     trace: str = ""
     """File for the twin's own joints, slice by slice; see trace.py."""
 
@@ -169,7 +171,7 @@ class ControllerServer:
             if self.setup.trace:
                 self._trace = TraceWriter(self.setup.trace)
             if self.setup.bus:
-                self._bus = BusPort(self.robot, self.setup.bus)
+                self._bus = BusPort(self.robot, self.setup.bus, keys=self.setup.keys or None)
         except OSError:
             self.close()
             raise

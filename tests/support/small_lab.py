@@ -61,7 +61,8 @@ def make_lab(folder, host, *, cell=None, **rig):
 
 def controller_of(folder, host, **settings):
     """Return the virtual controller of a lab, not yet started."""
-    return ControllerProcess(Setup(host=host, scenario=str(folder / "small.yaml"), bus=f"tcp/{host}:7447", **settings))
+    chosen = {"bus": f"tcp/{host}:7447"} | settings
+    return ControllerProcess(Setup(host=host, scenario=str(folder / "small.yaml"), **chosen))
 
 
 def start(folder, *arguments, **popen):

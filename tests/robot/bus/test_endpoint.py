@@ -2,7 +2,7 @@
 
 import pytest
 
-from robot.bus.endpoint import Endpoint, on_loopback, read_endpoint
+from robot.bus.endpoint import Endpoint, read_endpoint, safe_endpoint
 from robot.bus.errors import BusConfigError
 
 
@@ -17,7 +17,7 @@ from robot.bus.errors import BusConfigError
     ],
 )
 def test_loopback_is_taken_apart(text, parts):
-    assert on_loopback(text) == Endpoint(text=text, **parts)
+    assert safe_endpoint(text, has_keys=False) == Endpoint(text=text, **parts)
 
 
 @pytest.mark.parametrize(
@@ -28,7 +28,7 @@ def test_loopback_is_taken_apart(text, parts):
 def test_off_loopback_is_refused_in_one_line_that_says_why(text):
     assert read_endpoint(text).text == text
     with pytest.raises(BusConfigError, match=r"on loopback.*certificates") as refusal:
-        on_loopback(text)
+        safe_endpoint(text, has_keys=False)
     assert "\n" not in str(refusal.value)
 
 
@@ -40,4 +40,18 @@ def test_off_loopback_is_refused_in_one_line_that_says_why(text):
 )  # fmt: skip
 def test_what_is_no_endpoint_is_refused(text):
     with pytest.raises(BusConfigError, match="expected an endpoint such as"):
-        on_loopback(text)
+        safe_endpoint(text, has_keys=False)
+
+
+@pytest.mark.parametrize("text", ["tls/127.0.0.1:7447", "tls/192.168.1.5:7447", "tls/cell.example:7447"])
+def test_with_certificates_others_may_reach_it_and_without_them_nobody_listens(text):
+    endpoint = safe_endpoint(text, has_keys=True)
+    assert (endpoint.is_tls, endpoint.port) == (True, 7447)
+    with pytest.raises(BusConfigError, match="expected certificates"):
+        safe_endpoint(text, has_keys=False)
+
+
+@pytest.mark.parametrize("text", ["tcp/127.0.0.1:7447", "unixsock-stream//run/bus.sock", "tcp/192.168.1.5:7447"])
+def test_certificates_that_would_not_be_asked_for_are_refused(text):
+    with pytest.raises(BusConfigError, match="asks for the rig's certificates"):
+        safe_endpoint(text, has_keys=True)
