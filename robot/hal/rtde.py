@@ -28,15 +28,12 @@ from robot.hal.rtde_outputs import N_OUTPUTS
 from robot.hal.rtde_probe import probe_rtde
 from robot.hal.rtde_set_up import require, status_of
 from robot.hal.ur_calls import bounded, named
-from robot.hal.ur_checks import check_facts, check_pose, check_serial
-from robot.hal.ur_primary import read_facts
+from robot.hal.ur_identity import identify
 from robot.hal.ur_state import (
     Runtime,
     UrStatus,
     check_ready,
-    check_version,
     mode_of,
-    parse_version,
     why_refused,
     why_slowed,
 )
@@ -117,21 +114,12 @@ class RtdeArm:
         """
         if self._receive is not None:
             return
-        facts = read_facts(self.address, greeted=check_version)  # PolyScope X has no dashboard that could be asked
-        dashboard = DashboardClient(self.address)
-        with named("dashboard", self.address):
-            dashboard.connect()
-            version = parse_version(dashboard.polyscopeVersion())
-            self.serial = dashboard.getSerialNumber().strip()
-        if self._expected_serial is not None:
-            check_serial(self.serial, self._expected_serial, self.address)
-        check_version(version)
-        check_facts(facts, self._arm)
-        check_pose(facts)
+        known = identify(address=self.address, arm=self._arm, serial=self._expected_serial)
+        self.serial = known.serial
         probe_rtde(self.address)
         with named("RTDE", self.address), bounded(TAKE_S if self.links.when_lost is not None else None):
             self._receive = RTDEReceiveInterface(self.address, RATE_HZ, list(FIELDS))
-        self._dashboard = dashboard
+        self._dashboard = known.dashboard
         self._gripper.connect(self.address)
         self._pace.pace_by(self._receive)
         self._wait_first_state()

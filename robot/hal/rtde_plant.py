@@ -7,9 +7,11 @@ from config.cell import CellConfig
 from config.rig import Rig
 from config.scenario import Scenario
 from robot.errors import RobotConfigError
+from robot.hal.pins import Pins
 from robot.hal.protocols import Camera, Resetter, SceneTruth
 from robot.hal.rtde import RtdeArm
 from robot.hal.rtde_clock import TICK_NS
+from robot.hal.ur_observer import UrObserver
 from robot.hal.ur_state import kind_of_address
 from robot.messages import PlantIdentity
 
@@ -45,6 +47,7 @@ class RtdePlant:
         if round(rig.tick_s * 1e9) != TICK_NS:
             raise RobotConfigError(f"rig {rig.name}: expected tick_s 0.002, as the arm's, came {rig.tick_s}")
         self._kind, self._scenario = kind_of_address(rig.address), scenario
+        self._config, self._address, self._serial, self._cell = arm, rig.address, rig.expected.serial, cell
         self.arm = RtdeArm(arm=arm, address=rig.address, serial=rig.expected.serial, cell=cell)
         self.cameras: Mapping[str, Camera] = {}
         self.truth: SceneTruth | None = None
@@ -57,6 +60,10 @@ class RtdePlant:
     def abandon(self) -> None:
         """Stop the fingers, before this process ends."""
         self.arm.abandon()
+
+    def observer(self) -> UrObserver:
+        """Return somebody who looks at the arm by clients that cannot move it."""
+        return UrObserver(arm=self._config, address=self._address, serial=self._serial, pins=Pins(self._cell))
 
     @property
     def identity(self) -> PlantIdentity:

@@ -6,11 +6,13 @@ from collections.abc import Sequence
 import numpy as np
 
 from config.arm import ArmConfig
+from config.limits import ArmPart
+from config.posture import part_points
 from robot.errors import RobotConfigError
 from robot.geometry import quat_of_rotation_vector
 from robot.hal.ur_primary import ArmFacts
 
-__all__ = ["check_facts", "check_pose", "check_serial", "flange_pose"]
+__all__ = ["check_facts", "check_pose", "check_serial", "flange_pose", "tool_off_m"]
 
 CALIBRATION_M, CALIBRATION_RAD = 0.01, 0.05
 """Farther than this from nominal is no calibration of this model. A UR5e's own lie within some millimetres and mrad; a
@@ -79,6 +81,13 @@ def check_pose(facts: ArmFacts) -> None:
             f"expected the arm's tool where its joints bring it, within {1e3 * POSE_M:g} mm and {1e3 * POSE_RAD:g} "
             f"mrad; it is {1e3 * away_m:.3f} mm and {1e3 * away_rad:.2f} mrad off: is its calibration whole?"
         )
+
+
+def tool_off_m(facts: ArmFacts, arm: ArmConfig, q_rad: Sequence[float]) -> float:
+    """Return how far the arm's own kinematics bring the file's tool from where the file's kinematics do.  (6,) -> ()"""
+    its_m = flange_pose(facts, q_rad) @ (*arm.tool.tcp_m, 1.0)
+    ours_m = part_points(arm, q_rad)[ArmPart.TCP]
+    return math.dist(its_m[:3].tolist(), ours_m)
 
 
 def flange_pose(facts: ArmFacts, q_rad: Sequence[float]) -> np.ndarray:

@@ -14,10 +14,15 @@ from robot.rigs import load
 from robot.stdio import STDERR, redirected_stdout
 from robot.teleop.wanted import Answer, Wanted
 
-__all__ = ["CHECKERS", "app"]
+__all__ = ["CHECKERS", "IN_SHADOW", "PROBERS", "app"]
 
-CHECKERS = {"twin": "sim_twin.checking:check_rig"}
-"""Who checks a rig, by the kind of its plant. What is not here is never sent a hostile stream."""
+IN_SHADOW = "sim_twin.checking.shadowed:check_in_shadow"
+CHECKERS = {"twin": "sim_twin.checking:check_rig", "virtual": IN_SHADOW, "real": IN_SHADOW}
+"""Who checks a rig, by the kind of its plant. An arm on a wire is only looked at: streams end at a shadow's gate."""
+PROBERS = {"virtual": "robot.teleop.probe:probe_rig", "real": "robot.teleop.probe:probe_rig"}
+"""Who moves an arm on a wire by the probe list, a person attending."""
+ALONE = ("full", "mutate", "stream", "commands", "blocks", "workers", "seed")
+"""What says nothing of a probe list, which is always the same."""
 
 app = typer.Typer(
     invoke_without_command=True,
@@ -62,10 +67,16 @@ def drive(
 @app.command()
 def check(
     *,
-    rig: Annotated[str, typer.Option(help="Which rig; its plant must be a twin.")] = "twin",
+    context: typer.Context,
+    rig: Annotated[
+        str, typer.Option(help="Which rig. An arm on a wire is only watched: streams go to a shadow of it.")
+    ] = "twin",
     scenario: Annotated[str, typer.Option(help="Which table.")] = "paper",
     profile: Annotated[str | None, typer.Option(help="Limits in place of those that the rig names.")] = None,
     full: Annotated[bool, typer.Option("--full", help="All streams, not a seeded tenth.")] = False,
+    probe: Annotated[
+        bool, typer.Option("--probe", help="Arm on a wire: move it by a short, slow list, a person attending.")
+    ] = False,
     mutate: Annotated[bool, typer.Option("--mutate", help="Weaken each limit alone by 5 %; all must be told.")] = False,
     stream: Annotated[int | None, typer.Option(min=0, help="One stream alone, by its number.")] = None,
     seed: Annotated[int, typer.Option(min=0, help="Of all that is drawn.")] = 0,
@@ -75,18 +86,25 @@ def check(
     blocks: Annotated[int | None, typer.Option(min=1, help="So many blocks of streams only.")] = None,
     workers: Annotated[int | None, typer.Option(min=1, max=64, help="Processes.")] = None,
 ) -> None:
-    """Send hostile and human-like streams through a rig's stack; exit code 1 if the physics broke a limit."""
+    """Send hostile and human-like streams through a rig's stack; exit code 1 if the physics broke a limit.
+
+    An arm on a wire (virtual_lab, lab) stays disarmed and is only watched; with --probe it is armed and moved a little.
+    """
+    if probe:
+        _require_alone(context)
     resolved = _with_profile(resolve(rig=rig, scenario=scenario), profile)
     wanted = Wanted(
         seed=seed, full=full, json=json, out=out, stream=stream, mutate=mutate, n_commands=commands, n_blocks=blocks,
-        n_workers=workers,
+        n_workers=workers, probe=probe,
     )  # fmt: skip
-    checker = load(_checker(resolved))
+    checker = load(_checker(resolved, PROBERS if probe else CHECKERS))
     try:
         with redirected_stdout(STDERR):
             answer: Answer = checker(resolved, wanted)
     except KeyboardInterrupt:
-        typer.echo("interrupted: nothing was decided; the same seed begins again", err=True)
+        typer.echo(
+            "interrupted: nothing was decided, nothing is held any more; the same command begins again", err=True
+        )
         raise typer.Exit(1) from None
     if json:
         typer.echo(answer.json)
@@ -107,16 +125,26 @@ def _with_profile(resolved: Resolved, profile: str | None) -> Resolved:
     return msgspec.structs.replace(resolved, rig=msgspec.structs.replace(resolved.rig, profile=profile))
 
 
-def _checker(resolved: Resolved) -> str:
+def _require_alone(context: typer.Context) -> None:
+    """Refuse options beside --probe that choose among streams."""
+    sources = {name: context.get_parameter_source(name) for name in ALONE}
+    given = [name for name, source in sources.items() if source is not None and source.name == "COMMANDLINE"]
+    if given:
+        raise typer.BadParameter(
+            f"expected no --{given[0]} beside it: its list is always the same", param_hint="--probe"
+        )
+
+
+def _checker(resolved: Resolved, known: dict[str, str]) -> str:
     """Return who checks this rig.
 
     Raises:
-        RobotConfigError: its plant is not a simulated one in this process: nothing was connected to.
+        RobotConfigError: nobody does: nothing was connected to.
     """
     kind, name = resolved.rig.expected.kind, resolved.rig.name
-    if kind in CHECKERS:
-        return CHECKERS[kind]
+    if kind in known:
+        return known[kind]
     raise RobotConfigError(
-        f"rig {name}: expected a plant of kind {' or '.join(CHECKERS)}, it is {kind}. Hostile streams are for a twin: "
-        "check a twin's rig with the same limits file and profile. Nothing was connected to, nothing moves"
+        f"rig {name}: expected a plant of kind {' or '.join(known)}, it is {kind}. Nothing was connected to, nothing "
+        "moves"
     )

@@ -20,6 +20,8 @@ class Wanted(msgspec.Struct, frozen=True, kw_only=True):
     """One stream alone, by its number."""
     mutate: bool = False
     """Weaken each limit of the stack alone and see that the battery tells."""
+    probe: bool = False
+    """Move the arm by a short, slow list, a person attending."""
     n_commands: int | None = None
     """Commands a stream; None for the battery's own."""
     n_blocks: int | None = None

@@ -3,12 +3,13 @@
 from config.loader import resolve
 from robot.bench import BenchReport, bench_report
 from robot.teleop.wanted import Wanted
-from sim_twin.checking.command import measured
+from sim_twin.checking.command import measured, setup_of
 
 __all__ = ["bench_safety"]
 
 
 def bench_safety(*, full: bool) -> BenchReport:
     """Let hostile and human-like streams loose on the twin: all of them, or a tenth, some minutes."""
-    report = measured(resolve(), Wanted(full=full))
+    wanted = Wanted(full=full)
+    report = measured(setup_of(resolve(), wanted), wanted)
     return bench_report("safety", report.results, seconds=report.seconds)

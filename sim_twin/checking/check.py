@@ -3,7 +3,7 @@
 import os
 import signal
 from collections.abc import Callable, Iterator
-from concurrent.futures import Future, ProcessPoolExecutor, as_completed
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from functools import lru_cache
 from multiprocessing import get_context
 
@@ -14,6 +14,7 @@ from config.limits import Profile
 from config.resolved import Resolved
 from robot.teleop import Battery, Search
 from robot.teleop.search import Candidates
+from sim_twin.as_seen import Beginning
 from sim_twin.checking.ring import Ring, StreamResult
 from sim_twin.perturb import PERTURBATIONS
 
@@ -22,6 +23,7 @@ __all__ = ["FULL_STREAMS", "N_COMMANDS", "Block", "Setup", "check_streams", "par
 FULL_STREAMS, N_COMMANDS = 3072, 334
 PART = 10
 BLOCK_STREAMS = 8
+LOOK_S = 0.2
 
 
 class Setup(msgspec.Struct, frozen=True, kw_only=True):
@@ -34,6 +36,8 @@ class Setup(msgspec.Struct, frozen=True, kw_only=True):
     seed: int
     n_streams: int = FULL_STREAMS
     n_commands: int = N_COMMANDS
+    start: Beginning | None = None
+    """Where arm and table are at each stream's beginning; drawn for each where None."""
 
     @property
     def battery(self) -> Battery:
@@ -89,9 +93,21 @@ def _goals(profile: Profile) -> tuple[str, ...]:
 
 
 def check_streams(
-    setup: Setup, blocks: tuple[Block, ...], *, n_workers: int, heard: Callable[[list[StreamResult]], None]
+    setup: Setup,
+    blocks: tuple[Block, ...],
+    *,
+    n_workers: int,
+    heard: Callable[[list[StreamResult]], None],
+    look: Callable[[], object] = lambda: None,
 ) -> None:
     """Run blocks on so many processes, and tell of each block's results as it ends.
+
+    Args:
+        setup: what is checked.
+        blocks: which streams.
+        n_workers: how many processes; one is this one.
+        heard: told of each block's results.
+        look: called now and then; what it raises ends the check.
 
     Raises:
         KeyboardInterrupt: a person had enough; no worker is left behind.
@@ -100,13 +116,18 @@ def check_streams(
     if n_workers == 1:
         for block in blocks:
             heard(run_block(coded, block))
+            look()
         return
     pool = ProcessPoolExecutor(n_workers, mp_context=get_context("spawn"), initializer=_leave_ctrl_c)
     futures: list[Future[list[StreamResult]]] = []
     try:
         futures.extend(pool.submit(run_block, coded, block) for block in blocks)
-        for future in as_completed(futures):
-            heard(future.result())
+        pending = set(futures)
+        while pending:
+            done, pending = wait(pending, timeout=LOOK_S, return_when=FIRST_COMPLETED)
+            look()
+            for future in done:
+                heard(future.result())
     finally:
         for future in futures:
             future.cancel()
@@ -122,7 +143,7 @@ def _leave_ctrl_c() -> None:
 @lru_cache(maxsize=2 * len(PERTURBATIONS))
 def _made(coded: bytes, plant: int) -> tuple[Setup, Ring]:
     setup = msgspec.json.decode(coded, type=Setup)
-    ring = Ring(setup.resolved, PERTURBATIONS[plant], setup.profile, n_commands=setup.n_commands)
+    ring = Ring(setup.resolved, PERTURBATIONS[plant], setup.profile, n_commands=setup.n_commands, start=setup.start)
     return setup, ring
 
 

@@ -1,6 +1,7 @@
 """What `autotelic teleop check` does on a twin: progress, report, figure. The command itself knows no twin."""
 
 import os
+from collections.abc import Callable
 from pathlib import Path
 from time import perf_counter
 
@@ -11,34 +12,43 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from config.resolved import Resolved
 from robot.bench import BenchResult, bench_report
 from robot.teleop.wanted import Answer, Wanted
+from sim_twin.as_seen import Beginning
 from sim_twin.checking.check import N_COMMANDS, Setup, check_streams, part_of, rerun
 from sim_twin.checking.mutations import MUTATIONS, try_mutation
 from sim_twin.checking.report import CheckReport, MutationReport, as_json, draw, shown, shown_mutations
 from sim_twin.checking.ring import StreamResult
 from sim_twin.checking.tally import Tally
 
-__all__ = ["check_rig", "measured"]
+__all__ = ["check_rig", "keep", "measured", "setup_of"]
 
 
 def check_rig(resolved: Resolved, wanted: Wanted) -> Answer:
     """Check a twin's rig and return what is to be shown of it."""
     if wanted.mutate:
         return _mutate(resolved, wanted)
-    report = measured(resolved, wanted)
+    setup = setup_of(resolved, wanted)
+    report = measured(setup, wanted)
+    if wanted.out is not None:
+        keep(setup, report, wanted.out)
     return Answer(json=as_json(report), shown=shown(report), is_passed=report.is_passed)
 
 
-def measured(resolved: Resolved, wanted: Wanted) -> CheckReport:
-    """Run the streams that are wanted, keep report and figure where that is asked for, and return the report."""
-    setup = Setup(
-        resolved=resolved, profile=resolved.profile, seed=wanted.seed, n_commands=wanted.n_commands or N_COMMANDS
+def setup_of(resolved: Resolved, wanted: Wanted, *, start: Beginning | None = None) -> Setup:
+    """Return what is checked, by the options; `start` is where arm and table are at each stream's beginning."""
+    return Setup(
+        resolved=resolved,
+        profile=resolved.profile,
+        seed=wanted.seed,
+        n_commands=wanted.n_commands or N_COMMANDS,
+        start=start,
     )
+
+
+def measured(setup: Setup, wanted: Wanted, *, look: Callable[[], object] = lambda: None) -> CheckReport:
+    """Run the streams that are wanted, and return the report; what `look` raises meanwhile ends the check."""
     begin = perf_counter()
-    tally = _one(setup, wanted.stream) if wanted.stream is not None else _many(setup, wanted)
-    report = _report(setup, tally, wanted, seconds=perf_counter() - begin)
-    if wanted.out is not None:
-        _keep(setup, report, wanted.out)
-    return report
+    tally = _one(setup, wanted.stream) if wanted.stream is not None else _many(setup, wanted, look)
+    return _report(setup, tally, wanted, seconds=perf_counter() - begin)
 
 
 def _one(setup: Setup, number: int) -> Tally:
@@ -48,7 +58,7 @@ def _one(setup: Setup, number: int) -> Tally:
     return tally
 
 
-def _many(setup: Setup, wanted: Wanted) -> Tally:
+def _many(setup: Setup, wanted: Wanted, look: Callable[[], object]) -> Tally:
     blocks = part_of(setup, full=wanted.full)
     if wanted.n_blocks:
         blocks = blocks[: wanted.n_blocks]
@@ -63,7 +73,7 @@ def _many(setup: Setup, wanted: Wanted) -> Tally:
                 tally.add(came)
             progress.update(task, advance=len(results), description=f"streams, {tally.n_violations} violations")
 
-        check_streams(setup, blocks, n_workers=n_workers, heard=heard)
+        check_streams(setup, blocks, n_workers=n_workers, heard=heard, look=look)
     return tally
 
 
@@ -75,10 +85,11 @@ def _report(setup: Setup, tally: Tally, wanted: Wanted, *, seconds: float) -> Ch
     )  # fmt: skip
 
 
-def _keep(setup: Setup, report: CheckReport, folder: Path) -> None:
+def keep(setup: Setup, report: CheckReport, folder: Path, *, about: str = "") -> None:
+    """Keep a report and its figure in a folder, the figure headed by what it is about."""
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "check.json").write_text(as_json(report) + "\n", encoding="utf-8")
-    draw(setup, report, folder / "margins.png")
+    draw(setup, report, folder / "margins.png", about=about)
 
 
 def _mutate(resolved: Resolved, wanted: Wanted) -> Answer:

@@ -78,7 +78,7 @@ def shown(report: CheckReport) -> tuple[RenderableType, ...]:
     return table, f"{sums} in {report.seconds:.0f} s", *hint
 
 
-def draw(setup: Setup, report: CheckReport, path: Path) -> None:
+def draw(setup: Setup, report: CheckReport, path: Path, *, about: str = "") -> None:
     """Draw distance to limit over time for the streams that came nearest to theirs, or broke them."""
     has_course = [row for row in report.limits if not row.limit.startswith(("force:", "meeting_", "contact", "stop"))]
     chosen: list[LimitRow] = []
@@ -86,6 +86,8 @@ def draw(setup: Setup, report: CheckReport, path: Path) -> None:
         if len(chosen) < N_DRAWN and row.stream not in {c.stream for c in chosen}:
             chosen.append(row)
     figure = Figure(figsize=(9.0, 2.2 * max(len(chosen), 1)), layout="constrained")
+    if about:
+        figure.suptitle(about, fontsize=9)
     for axes, row in zip(figure.subplots(max(len(chosen), 1), 1, squeeze=False)[:, 0], chosen, strict=False):
         _, ring = rerun(setup, row.stream)
         course = ring.course

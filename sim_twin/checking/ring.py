@@ -13,6 +13,7 @@ from robot.safety import Operator
 from robot.teleop import Arena, Ask, Look, Seen, Send, Silence, Write
 from robot.tick_loop import TickLoop
 from sim_twin.allowances import allowances_for
+from sim_twin.as_seen import AsSeen, Beginning
 from sim_twin.monitor import Monitor
 from sim_twin.perturb import Perturbation, perturbed_plant
 from sim_twin.readings import Margin, Reading
@@ -85,6 +86,7 @@ class Ring:
         perturbation: how the plant differs from its file.
         profile: the limits that the monitor holds: the stack's own, or the true ones where those were weakened.
         n_commands: how many commands a stream has.
+        start: where arm and table are at the beginning; drawn for each stream where None.
     """
 
     def __init__(
@@ -94,11 +96,14 @@ class Ring:
         profile: Profile,
         *,
         n_commands: int,
+        start: Beginning | None = None,
     ) -> None:
         rig = msgspec.structs.replace(resolved.rig, max_latches=10_000)  # latching is what it is here for
         self._resolved = msgspec.structs.replace(resolved, rig=rig)
         self._plant_name, self._n_commands = perturbation.name, n_commands
         self._plant = perturbed_plant(self._resolved, perturbation)
+        if start is not None:
+            self._plant.resetter = AsSeen(self._plant.world, start)
         self._station = build_station(self._resolved, plant=self._plant)
         operator = build_operator(rig)
         assert operator is not None, "a twin's rig names an operator"

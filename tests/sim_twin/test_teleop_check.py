@@ -14,7 +14,7 @@ from config.loader import resolve
 from robot.cli import app as root
 from robot.messages import Hold, Twist
 from robot.teleop import Send, Silence, Write
-from robot.teleop.cli import CHECKERS
+from robot.teleop.cli import CHECKERS, IN_SHADOW, PROBERS
 from robot.teleop.cli import app as teleop
 from sim_twin.checking.check import FULL_STREAMS, N_COMMANDS, Setup, check_streams, part_of, rerun
 from sim_twin.checking.mutations import MUTATIONS, try_mutation
@@ -203,16 +203,28 @@ def test_a_check_that_finds_nothing_passes(monkeypatch):
     assert ask().exit_code == 0
 
 
-@pytest.mark.parametrize("rig", ["virtual_lab", "lab", "fake"])
-def test_a_rig_that_is_no_twin_is_refused_before_anything_is_connected_to(rig, monkeypatch):
+@pytest.mark.parametrize("words", [("--rig", "fake"), ("--rig", "fake", "--probe"), ("--rig", "twin", "--probe")])
+def test_a_rig_that_nobody_checks_is_refused_before_anything_is_connected_to(words, monkeypatch):
     def never(*_: object) -> None:
         raise AssertionError("nothing may be built")
 
     monkeypatch.setattr("robot.teleop.cli.load", never)
-    came = CliRunner().invoke(root, ["teleop", "check", "--rig", rig])
+    came = CliRunner().invoke(root, ["teleop", "check", *words])
     assert came.exit_code == 2
     assert "nothing moves" in came.output
-    assert set(CHECKERS) == {"twin"}
+
+
+def test_an_arm_on_a_wire_is_checked_in_shadow_alone():
+    assert {kind: CHECKERS[kind] for kind in ("virtual", "real")} == dict.fromkeys(("virtual", "real"), IN_SHADOW)
+    assert CHECKERS["twin"] != IN_SHADOW
+    assert set(PROBERS) == {"virtual", "real"}
+
+
+@pytest.mark.parametrize("word", ["--full", "--mutate", "--stream=1", "--seed=0", "--blocks=1"])
+def test_what_chooses_among_streams_is_refused_beside_a_probe_list(word):
+    came = CliRunner().invoke(root, ["teleop", "check", "--rig", "virtual_lab", "--probe", word])
+    assert came.exit_code == 2
+    assert "its list is always the same" in came.output
 
 
 @pytest.mark.parametrize("words", [("--profile", "reckless"), ("--rig", "nowhere"), ("--stream", "-1")])
