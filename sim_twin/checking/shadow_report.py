@@ -52,7 +52,7 @@ def shown_shadow(report: ShadowReport) -> tuple[RenderableType, ...]:
     table = "laid out as perceived" if arm.is_table_perceived else "drawn anew for each stream: nobody perceives it"
     told = [
         f"{report.about}.",
-        f"It was watched for {arm.watched_s:.0f} s, {arm.n_looks} times, {arm.mode}, and moved by "
+        f"It was watched for {arm.watched_s:.0f} s, {arm.n_looks} times, in mode {arm.mode}, and moved by "
         f"{1e3 * arm.moved_rad:.3f} mrad at most; no program ran, nobody armed it.",
         f"Shadows began at its joints ({joints}) rad, the hand open and empty, their table {table}.",
         f"Its own kinematics bring the tool {1e3 * arm.tool_off_m:.2f} mm from where its file does.",
