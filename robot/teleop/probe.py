@@ -2,7 +2,7 @@
 
 import sys
 from collections import deque
-from contextlib import ExitStack, closing
+from contextlib import closing
 from time import perf_counter, sleep
 
 import msgspec
@@ -77,8 +77,7 @@ def probe_rig(resolved: Resolved, wanted: Wanted) -> Answer:
         observer.connect()
         probes, narrowed = _planned(resolved, observer)
         attendant.tell(_announced(resolved, observer, probes))
-        with ExitStack() as stack:
-            station = stack.enter_context(build_station(narrowed, is_driven=True))
+        with build_station(narrowed, is_driven=True) as station:
             carried, ended = _carried_out(station, observer, operator, attendant, probes)
         rows = [row for each in carried for row in judge_probe(each, narrowed.profile.stopping)]
         rows += _let_go(observer)

@@ -34,15 +34,14 @@ class ShadowReport(CheckReport, frozen=True, kw_only=True):
     """What a check in shadow found."""
 
     is_shadow: bool
-    n_sent_to_arm: int
-    """Commands, programs and outputs: none, for no client was opened that could."""
+    """Streams ended at a shadow's gate: no client was opened that could move the arm, or write to it."""
     arm: WatchedArm
 
     @property
     def about(self) -> str:
         """What it is a report of, in one line."""
         arm = self.arm
-        return f"SHADOW of the {arm.kind} arm {arm.model} {arm.serial} at {arm.address}: nothing was sent to it"
+        return f"SHADOW of the {arm.kind} arm {arm.model} {arm.serial} at {arm.address}, which was sent nothing"
 
 
 def shown_shadow(report: ShadowReport) -> tuple[RenderableType, ...]:
