@@ -2,7 +2,7 @@
 
 import sys
 from collections import deque
-from contextlib import ExitStack, closing
+from contextlib import closing
 from time import perf_counter, sleep
 
 import msgspec
@@ -11,6 +11,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from config.limited import limited
+from config.posture import tilt_rad
 from config.resolved import Resolved
 from robot.bench import BenchReport, BenchResult, bench_report
 from robot.chain import ToolChain
@@ -21,6 +22,7 @@ from robot.messages import PlantIdentity
 from robot.rigs import build_plant, build_station, check_usable
 from robot.safety import Operator
 from robot.teleop.attending import Attendant, attending
+from robot.teleop.probe_judge import Carried, judge_probe
 from robot.teleop.probe_run import ProbeRun
 from robot.teleop.probes import ASKED_M_S, PROFILE, Probe, plan, probe_rig_of
 from robot.teleop.wanted import Answer, Wanted
@@ -62,7 +64,7 @@ def probe_rig(resolved: Resolved, wanted: Wanted) -> Answer:
 
     Raises:
         RobotConfigError: the rig is not filled in, or another arm is found.
-        SafetyError: nobody attends, the arm is not armed, or there is too little room about its tool.
+        SafetyError: nobody attends, the arm is not armed, its tool is tilted, or has too little room.
         WireError: nobody answers, or its link was lost.
     """
     check_usable(resolved.rig)
@@ -75,15 +77,15 @@ def probe_rig(resolved: Resolved, wanted: Wanted) -> Answer:
         observer.connect()
         probes, narrowed = _planned(resolved, observer)
         attendant.tell(_announced(resolved, observer, probes))
-        with ExitStack() as stack:
-            station = stack.enter_context(build_station(narrowed, is_driven=True))
-            rows, n_done, ended = _carried_out(station, observer, operator, attendant, probes, narrowed)
+        with build_station(narrowed, is_driven=True) as station:
+            carried, ended = _carried_out(station, observer, operator, attendant, probes)
+        rows = [row for each in carried for row in judge_probe(each, narrowed.profile.stopping)]
         rows += _let_go(observer)
         report = ProbeReport(
             **msgspec.structs.asdict(bench_report("probe", rows, seconds=perf_counter() - begin)),
             rig=resolved.rig.name, profile=resolved.rig.profile, plant=observer.identity,
             address=resolved.rig.address or "", armed_by=getattr(operator, "name", type(operator).__name__),
-            n_probes=len(probes), n_done=n_done, ended=ended,
+            n_probes=len(probes), n_done=len(carried), ended=ended,
         )  # fmt: skip
     text = msgspec.json.encode(report).decode()
     if wanted.out is not None:
@@ -97,13 +99,14 @@ def _planned(resolved: Resolved, observer: Observer) -> tuple[tuple[Probe, ...],
 
     Raises:
         ArmRefusedError: somebody's program runs on the arm.
-        SafetyError: there is too little room.
+        SafetyError: the tool is tilted, or there is too little room.
     """
     sight = observer.see()
     if sight.is_program_running:
         raise ArmRefusedError("expected no program on the arm, one is running: whoever started it must stop it")
     held = limited(resolved.arm, resolved.profile)
-    probes, box = plan(ToolChain(held).tcp(sight.q_rad), held.motion.workspace_m)
+    tool_m, tilt = ToolChain(held).tcp(sight.q_rad), tilt_rad(held, sight.q_rad)
+    probes, box = plan(tool_m, held.motion.workspace_m, tilt_rad=tilt)
     return probes, probe_rig_of(resolved, box)
 
 
@@ -113,6 +116,7 @@ def _announced(resolved: Resolved, observer: Observer, probes: tuple[Probe, ...]
     return "\n".join((
         f"probe list on the {identity.kind.value} arm {identity.serial} at {resolved.rig.address}, profile "
         f"{resolved.rig.profile} and narrower ({PROFILE}), at {1e3 * ASKED_M_S:g} mm/s:", *lines,
+        "before the first the arm is taken: a hand that is not active then strokes fully open and shut",
         "stand clear, hand on the emergency stop; Ctrl-C stops the arm too",
     ))  # fmt: skip
 
@@ -123,23 +127,22 @@ def _carried_out(
     operator: Operator,
     attendant: Attendant,
     probes: tuple[Probe, ...],
-    narrowed: Resolved,
-) -> tuple[list[BenchResult], int, str]:
-    """Have the station armed and carry the list out; return its figures, how many probes were done, why no more."""
+) -> tuple[list[Carried], str]:
+    """Have the station armed and carry the list out; return what came of each probe, and why there are no more."""
     sights: deque[Sight] = deque(maxlen=N_SIGHTS)
     station.take_lease("teleop check --probe", life_ns=LEASE_NS)
     operator.arm_once(station)
-    rows: list[BenchResult] = []
+    carried: list[Carried] = []
     with Watcher(observer, take=sights.append, period_s=LOOK_S) as watcher:
-        run = ProbeRun(station=station, sights=sights, stopping=narrowed.profile.stopping)
-        for n_done, probe in enumerate(probes):
-            if not _is_wanted(run, attendant, f"{n_done + 1} of {len(probes)}, {probe.told}"):
-                return rows, n_done, run.refusal or "ended by the person who attends"
-            rows += run.run(probe)
+        run = ProbeRun(station=station, sights=sights)
+        for probe in probes:
+            if not _is_wanted(run, attendant, f"{len(carried) + 1} of {len(probes)}, {probe.told}"):
+                return carried, run.refusal or "ended by the person who attends"
+            carried.append(run.run(probe))
             watcher.require()
-            if run.refusal and n_done + 1 < len(probes):
-                return rows, n_done + 1, run.refusal
-    return rows, len(probes), ""
+            if run.refusal and len(carried) < len(probes):
+                return carried, run.refusal
+    return carried, ""
 
 
 def _is_wanted(run: ProbeRun, attendant: Attendant, text: str) -> bool:

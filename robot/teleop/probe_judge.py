@@ -12,7 +12,7 @@ from robot.hal.sight import Sight
 from robot.messages import Vec3
 from robot.teleop.probes import MOST_M_S, TURN_RAD, UNDER_WAY_M, WALL_M, WAY_M, WRIST, Kind, Probe
 
-__all__ = ["RAMP_S", "Marks", "judge_probe"]
+__all__ = ["RAMP_S", "Carried", "Marks", "judge_probe"]
 
 Array = NDArray[np.float64]
 WAY_OFF_M, LINE_OFF_M, BACK_OFF_M, TURN_OFF_RAD = 0.002, 0.003, 0.002, 0.005
@@ -45,15 +45,23 @@ class Marks(msgspec.Struct, frozen=True, kw_only=True):
     """The station latched by the end."""
 
 
-def judge_probe(probe: Probe, marks: Marks, sights: Sequence[Sight], stopping: Stopping) -> tuple[BenchResult, ...]:
+class Carried(msgspec.Struct, frozen=True, kw_only=True):
+    """One probe that was carried out."""
+
+    probe: Probe
+    marks: Marks
+    sights: tuple[Sight, ...]
+    """What was seen of the arm meanwhile, in order."""
+
+
+def judge_probe(carried: Carried, stopping: Stopping) -> tuple[BenchResult, ...]:
     """Return the figures of one probe, each with what it is asked to be.
 
     Args:
-        probe: which.
-        marks: when what happened.
-        sights: what was seen of the arm, in order; from before the list began.
+        carried: what came of it.
         stopping: of the limits that are held.
     """
+    probe, marks, sights = carried.probe, carried.marks, carried.sights
     seen = [s for s in sights if marks.begun_ns <= s.seen_ns <= marks.ended_ns]
     if not seen:
         return (_row(probe, "looks", 0.0, "1", ">= 1", ok=False),)

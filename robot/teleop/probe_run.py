@@ -5,13 +5,11 @@ from collections import deque
 from collections.abc import Callable
 from time import monotonic_ns, sleep
 
-from config.limits import Stopping
-from robot.bench import BenchResult
 from robot.errors import NotEngagedError
 from robot.hal.sight import Sight
 from robot.messages import Hold, Intent, JointTarget, StationMode, Twist
 from robot.teleop.driver import DrivenStation
-from robot.teleop.probe_judge import Marks, judge_probe
+from robot.teleop.probe_judge import Carried, Marks
 from robot.teleop.probes import ASKED_M_S, STEP_S, TURN_RAD, Kind, Probe, asks_of, turned
 
 __all__ = ["ProbeRun"]
@@ -30,7 +28,6 @@ class ProbeRun:
     Args:
         station: what is moved, by intents alone.
         sights: where somebody else puts what is seen of the arm, as it comes.
-        stopping: of the limits that are held.
         now_ns: the host's monotonic time, by which sights are stamped.
         pause: lets some seconds pass in which nobody asks for anything.
 
@@ -43,11 +40,10 @@ class ProbeRun:
         *,
         station: DrivenStation,
         sights: deque[Sight],
-        stopping: Stopping,
         now_ns: Callable[[], int] = monotonic_ns,
         pause: Callable[[float], object] = sleep,
     ) -> None:
-        self._station, self._sights, self._stopping = station, sights, stopping
+        self._station, self._sights = station, sights
         self._now_ns, self._pause = now_ns, pause
         self._start_m = station.measured.tcp_position_m
         self.refusal = ""
@@ -57,8 +53,8 @@ class ProbeRun:
         """Hold the arm for one step, while somebody thinks."""
         self._step(Hold())
 
-    def run(self, probe: Probe) -> tuple[BenchResult, ...]:
-        """Carry one probe out and return its figures."""
+    def run(self, probe: Probe) -> Carried:
+        """Carry one probe out. Nothing is reckoned meanwhile: an arm that is not asked anything for 200 ms latches."""
         self._sights.clear()
         self._limiters.clear()
         begun_ns = last_ns = self._now_ns()
@@ -83,7 +79,7 @@ class ProbeRun:
             ended_ns=self._now_ns(), start_m=self._start_m, limiters=limiters, refusal=self.refusal,
             is_latched=self._station.state.mode is StationMode.LATCHED,
         )  # fmt: skip
-        return judge_probe(probe, marks, tuple(self._sights), self._stopping)
+        return Carried(probe=probe, marks=marks, sights=tuple(self._sights))
 
     def _step(self, intent: Intent) -> None:
         """Carry out one step; after a refusal there is none any more."""

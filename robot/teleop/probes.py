@@ -28,6 +28,8 @@ WALL_M, AT_WALL_M = 0.03, 0.05
 ROOM_M = 0.055
 """What the tool needs on every other side."""
 MARGIN_M = 0.005
+UPRIGHT_RAD = 0.009
+"""Motion takes a tool for upright up to 10 mrad, and rights one that is tilted farther as soon as it moves."""
 WRIST = 5
 
 
@@ -52,16 +54,22 @@ class Probe(msgspec.Struct, frozen=True, kw_only=True):
     """Direction of the tool, base frame; not of a turn."""
 
 
-def plan(tool_m: Vec3, room_m: Box3) -> tuple[tuple[Probe, ...], Fence]:
+def plan(tool_m: Vec3, room_m: Box3, *, tilt_rad: float) -> tuple[tuple[Probe, ...], Fence]:
     """Return the list for a tool that stands somewhere, and the box that it stays in, a wall at one of its sides.
 
     Args:
         tool_m: the tool, base frame.
         room_m: where it may be by arm, scenario and profile.
+        tilt_rad: how far it is from pointing straight down.
 
     Raises:
-        SafetyError: there is too little room about it.
+        SafetyError: it is tilted, or there is too little room about it.
     """
+    if not tilt_rad <= UPRIGHT_RAD:
+        raise SafetyError(
+            f"probe list: expected a tool that points straight down, within {1e3 * UPRIGHT_RAD:g} mrad, it is tilted "
+            f"by {1e3 * tilt_rad:.0f}: motion would right it first, by more than a probe may move; bring the arm home"
+        )
     low = [t - a for t, a in zip(tool_m, room_m[0], strict=True)]
     high = [b - t for t, b in zip(tool_m, room_m[1], strict=True)]
     for name, below, above, least in zip("xyz", low, high, (ROOM_M, WALL_M + MARGIN_M, MARGIN_M), strict=True):

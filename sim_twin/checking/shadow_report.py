@@ -34,15 +34,14 @@ class ShadowReport(CheckReport, frozen=True, kw_only=True):
     """What a check in shadow found."""
 
     is_shadow: bool
-    n_sent_to_arm: int
-    """Commands, programs and outputs: none, for no client was opened that could."""
+    """Streams ended at a shadow's gate: no client was opened that could move the arm, or write to it."""
     arm: WatchedArm
 
     @property
     def about(self) -> str:
         """What it is a report of, in one line."""
         arm = self.arm
-        return f"SHADOW of the {arm.kind} arm {arm.model} {arm.serial} at {arm.address}: nothing was sent to it"
+        return f"SHADOW of the {arm.kind} arm {arm.model} {arm.serial} at {arm.address}, which was sent nothing"
 
 
 def shown_shadow(report: ShadowReport) -> tuple[RenderableType, ...]:
@@ -52,7 +51,7 @@ def shown_shadow(report: ShadowReport) -> tuple[RenderableType, ...]:
     table = "laid out as perceived" if arm.is_table_perceived else "drawn anew for each stream: nobody perceives it"
     told = [
         f"{report.about}.",
-        f"It was watched for {arm.watched_s:.0f} s, {arm.n_looks} times, {arm.mode}, and moved by "
+        f"It was watched for {arm.watched_s:.0f} s, {arm.n_looks} times, in mode {arm.mode}, and moved by "
         f"{1e3 * arm.moved_rad:.3f} mrad at most; no program ran, nobody armed it.",
         f"Shadows began at its joints ({joints}) rad, the hand open and empty, their table {table}.",
         f"Its own kinematics bring the tool {1e3 * arm.tool_off_m:.2f} mm from where its file does.",

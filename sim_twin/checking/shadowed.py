@@ -54,8 +54,8 @@ def check_in_shadow(resolved: Resolved, wanted: Wanted) -> Answer:
         raise RobotConfigError(f"rig {resolved.rig.name}: expected a plant whose arm can be looked at, it cannot be")
     with ExitStack() as stack:
         observer = stack.enter_context(closing(plant.observer()))
-        observer.connect()
         _require_expected(resolved, observer)
+        observer.connect()
         things = perceived(resolved)
         begin, still = perf_counter(), StandStill()
         watcher = stack.enter_context(Watcher(observer, take=still, period_s=LOOK_S))
@@ -85,7 +85,7 @@ def perceived(resolved: Resolved) -> tuple[ObjectPose, ...]:
 
 
 def _require_expected(resolved: Resolved, observer: Observer) -> None:
-    """Refuse another kind of plant than the rig names; model and serial were asked for at connecting."""
+    """Refuse another kind of plant than the rig names; who it is is asked at connecting."""
     rig, found = resolved.rig, observer.identity.kind.value
     if found != rig.expected.kind:
         raise RobotConfigError(
@@ -152,4 +152,4 @@ def _told(
         ),
     )  # fmt: skip
     fields = {**msgspec.structs.asdict(report), "results": (*report.results, *rows), "rig": resolved.rig.name}
-    return ShadowReport(**fields, arm=arm, is_shadow=True, n_sent_to_arm=0)
+    return ShadowReport(**fields, arm=arm, is_shadow=True)

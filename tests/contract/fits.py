@@ -9,12 +9,15 @@ from robot.hal.protocols import Arm, Camera, Clock, Plant
 from robot.hal.rtde import RtdeArm
 from robot.hal.rtde_clock import RtdeClock
 from robot.hal.rtde_plant import RtdePlant
+from robot.hal.sight import Observer, Watched
+from robot.hal.ur_observer import UrObserver
 from robot.local_station import LocalStation
 from robot.person import Person, PersonOperator, TerminalPerson
 from robot.safety import Armable, Operator
 from robot.station import Station
 from robot.station_doors import Perceives
 from robot.teleop import Device, DrivenStation
+from robot.teleop.attending import Attendant, NobodyAsked, TerminalAttendant
 from robot.teleop.driver import Pace, Unpaced
 from robot.teleop.gamepad import Gamepad
 from robot.teleop.keyboard import Keyboard
@@ -28,10 +31,12 @@ from sim_twin.rendered_camera import RenderedCamera
 __all__ = [
     "ARMABLES",
     "ARMS",
+    "ATTENDANTS",
     "CAMERAS",
     "CLOCKS",
     "DEVICES",
     "DRIVEN",
+    "OBSERVERS",
     "OPERATORS",
     "PACES",
     "PERCEIVERS",
@@ -39,10 +44,14 @@ __all__ = [
     "PERSONS",
     "PLANTS",
     "STATIONS",
+    "WATCHED",
 ]
 
 PLANTS: tuple[type[Plant], ...] = (FakePlant, TwinPlant, RtdePlant)
 ARMS: tuple[type[Arm], ...] = (FakeArm, TwinArm, RtdeArm)
+OBSERVERS: tuple[type[Observer], ...] = (UrObserver,)
+WATCHED: tuple[type[Watched], ...] = (RtdePlant,)
+ATTENDANTS: tuple[type[Attendant], ...] = (TerminalAttendant, NobodyAsked)
 CAMERAS: tuple[type[Camera], ...] = (FolderCamera, RenderedCamera)
 CLOCKS: tuple[type[Clock], ...] = (LockStepClock, RtdeClock)
 STATIONS: tuple[type[Station], ...] = (LocalStation,)

@@ -8,7 +8,7 @@ import pytest
 from config.limits import Stopping
 from robot.hal.sight import Sight
 from robot.messages import ArmMode
-from robot.teleop.probe_judge import Marks, judge_probe
+from robot.teleop.probe_judge import Carried, Marks, judge_probe
 from robot.teleop.probes import Kind, Probe
 
 STOPPING = Stopping(distance_m=0.1, time_s=0.5, deceleration_m_s2=2.0)
@@ -37,8 +37,12 @@ def marks(**values):
     return msgspec.structs.replace(plain, **values)
 
 
+def judged(probe, sights, **values):
+    return judge_probe(Carried(probe=probe, marks=marks(**values), sights=tuple(sights)), STOPPING)
+
+
 def figures(probe, sights, **values):
-    return {row.name: row for row in judge_probe(probe, marks(**values), sights, STOPPING)}
+    return {row.name: row for row in judged(probe, sights, **values)}
 
 
 def went(probe, far_m, *, aside_m=0.0, back_m=0.0):
@@ -144,4 +148,4 @@ def test_a_refused_step_and_an_arm_that_was_not_seen_fail_whatever_else_came():
     came = figures(LINE, went(LINE, 0.04), refusal="fence: beyond")
     assert not came["y_refused"].ok
     assert came["y_refused"].details == {"by": "fence: beyond"}
-    assert [row.ok for row in judge_probe(LINE, marks(), [], STOPPING)] == [False]
+    assert [row.ok for row in judged(LINE, [])] == [False]

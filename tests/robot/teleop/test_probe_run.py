@@ -14,6 +14,7 @@ from robot.messages import StationMode
 from robot.person import PersonOperator
 from robot.rigs import build_station
 from robot.teleop.attending import NobodyAsked, attending
+from robot.teleop.probe_judge import judge_probe
 from robot.teleop.probe_run import ProbeRun
 from robot.teleop.probes import STEP_S, plan, probe_rig_of
 from sim_twin.operator import SimulatedOperator
@@ -56,12 +57,12 @@ def listed():
     before.reset(seed=3, epoch=0)
     tool_m = before.measured.tcp_position_m
     before.close()
-    probes, box = plan(tool_m, TWIN.arm.motion.workspace_m)
+    probes, box = plan(tool_m, TWIN.arm.motion.workspace_m, tilt_rad=0.0)
     narrowed = probe_rig_of(TWIN, box)
     station = build_station(narrowed, is_driven=True)
     SimulatedOperator().arm_once(station)
     station.reset(seed=3, epoch=0)
-    yield probes, Seen(station), narrowed
+    yield probes, Seen(station), narrowed.profile.stopping
     station.close()
 
 
@@ -70,23 +71,19 @@ CHOSEN = ("y", "release", "wall")
 
 
 def test_probes_keep_what_they_are_asked_on_the_twin(listed):
-    probes, seen, narrowed = listed
-    run = ProbeRun(
-        station=seen, sights=seen.sights, stopping=narrowed.profile.stopping, now_ns=seen.now_ns, pause=lambda _: None
-    )
-    rows = [row for probe in probes if probe.name in CHOSEN for row in run.run(probe)]
+    probes, seen, stopping = listed
+    run = ProbeRun(station=seen, sights=seen.sights, now_ns=seen.now_ns, pause=lambda _: None)
+    rows = [row for probe in probes if probe.name in CHOSEN for row in judge_probe(run.run(probe), stopping)]
     assert [row for row in rows if not row.ok] == []
     assert {row.name.split("_")[0] for row in rows} == set(CHOSEN)
     assert run.refusal == ""
 
 
 def test_after_a_latch_nothing_of_the_list_moves_any_more(listed):
-    probes, seen, narrowed = listed
-    run = ProbeRun(
-        station=seen, sights=seen.sights, stopping=narrowed.profile.stopping, now_ns=seen.now_ns, pause=lambda _: None
-    )
+    probes, seen, stopping = listed
+    run = ProbeRun(station=seen, sights=seen.sights, now_ns=seen.now_ns, pause=lambda _: None)
     seen.stop(by="somebody")
-    rows = {row.name: row for row in run.run(probes[1])}
+    rows = {row.name: row for row in judge_probe(run.run(probes[1]), stopping)}
     assert not rows["x_refused"].ok if "x_refused" in rows else not rows["x_looks"].ok
     assert "stopped by somebody" in run.refusal
     n_steps = seen.n_steps

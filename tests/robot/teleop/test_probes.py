@@ -10,11 +10,13 @@ from hypothesis import strategies as st
 from config.loader import resolve
 from robot.errors import SafetyError
 from robot.messages import JointTarget, Twist
+from robot.motion.follower import ALIGN_RAD
 from robot.teleop.probes import (
     MARGIN_M,
     MOST_M_S,
     ROOM_M,
     STEP_S,
+    UPRIGHT_RAD,
     WALL_M,
     Kind,
     asks_of,
@@ -37,7 +39,7 @@ def way_m(probe):
 @given(PLACES)
 def test_every_probe_is_short_slow_and_inside_of_its_box_or_refused(tool_m):
     try:
-        probes, box = plan(tool_m, ROOM)
+        probes, box = plan(tool_m, ROOM, tilt_rad=0.0)
     except SafetyError:
         return
     for low, at, high, room_low, room_high in zip(box.low_m, tool_m, box.high_m, *ROOM, strict=True):
@@ -55,7 +57,7 @@ def test_every_probe_is_short_slow_and_inside_of_its_box_or_refused(tool_m):
 @given(PLACES)
 def test_the_wall_stands_three_centimetres_beside_the_tool_where_it_is_driven_at(tool_m):
     try:
-        probes, box = plan(tool_m, ROOM)
+        probes, box = plan(tool_m, ROOM, tilt_rad=0.0)
     except SafetyError:
         return
     (wall,) = [p for p in probes if p.kind is Kind.WALL]
@@ -82,21 +84,29 @@ def test_so_much_room_is_enough_and_less_is_refused(axis, corner, least_m):
         tool_m[axis] = ROOM[corner][axis] + sign * (least_m + off_m)
         if is_refused:
             with pytest.raises(SafetyError, match=f"along {'xyz'[axis]}"):
-                plan(tuple(tool_m), ROOM)
+                plan(tuple(tool_m), ROOM, tilt_rad=0.0)
         else:
-            plan(tuple(tool_m), ROOM)
+            plan(tuple(tool_m), ROOM, tilt_rad=0.0)
 
 
 @pytest.mark.parametrize(("z_m", "up"), [(0.225, 1.0), (0.2649, 1.0), (0.2651, -1.0), (0.30, -1.0)])
 def test_the_tool_goes_up_where_there_is_room_and_down_where_there_is_none(z_m, up):
-    probes, _ = plan((0.44, 0.0, z_m), ROOM)
+    probes, _ = plan((0.44, 0.0, z_m), ROOM, tilt_rad=0.0)
     (vertical,) = [p for p in probes if p.name == "z"]
     assert vertical.along == (0.0, 0.0, up)
     assert ("up" if up > 0.0 else "down") in vertical.told
 
 
+@pytest.mark.parametrize("tilt", [math.nextafter(UPRIGHT_RAD, 1.0), 0.1, math.nan])
+def test_a_tilted_tool_which_motion_would_right_first_is_refused(tilt):
+    plan(MIDDLE, ROOM, tilt_rad=UPRIGHT_RAD)
+    with pytest.raises(SafetyError, match="points straight down"):
+        plan(MIDDLE, ROOM, tilt_rad=tilt)
+    assert UPRIGHT_RAD < ALIGN_RAD
+
+
 def test_one_joint_alone_is_turned_by_a_tenth_at_most():
-    probes, _ = plan(MIDDLE, ROOM)
+    probes, _ = plan(MIDDLE, ROOM, tilt_rad=0.0)
     turns = [ask.q_rad for ask in asks_of(probes[0], Q) if isinstance(ask, JointTarget)]
     assert {q[:5] for q in turns} == {Q[:5]}
     assert max(abs(q[5] - Q[5]) for q in turns) <= 0.1 + 1e-12
@@ -110,7 +120,7 @@ def test_the_rig_for_the_list_is_narrower_than_its_profile_in_everything_and_wid
 
     resolved = resolve(rig="virtual_lab")
     resolved = replace(resolved, rig=replace(resolved.rig, profile=name))
-    _, box = plan(MIDDLE, ROOM)
+    _, box = plan(MIDDLE, ROOM, tilt_rad=0.0)
     before, after = resolved.profile, probe_rig_of(resolved, box).profile
     for key in ("tcp_m_s", "elbow_m_s", "flange_m_s"):
         assert getattr(after.speeds, key) <= min(MOST_M_S, getattr(before.speeds, key))
