@@ -1,11 +1,23 @@
-"""A way in which the genuine ur_rtde client, bare, moves an arm that nobody asked to move: it does, here too.
+"""Ways in which the genuine ur_rtde client, bare, moves an arm that nobody asked to move: it does, here too.
 
-The fault trials (`autotelic bench faults`) say that nothing moves under our backend after a stop. That could be so
-because nothing here ever would; this shows that it would.
+That nothing moves so under our backend could be because nothing here ever would; these show that it would, and that
+ours does not: below, and for a link that is lost and a script that is uploaded again in the trials
+`link_cut_3s_and_jogged` and `servo_process_hung_and_jogged` of `tests/sim_twin/broken/test_faults.py`.
 """
 
+import socket
+import time
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
 import pytest
 
+from config.loader import load_arm
+from sim_twin.broken.rider import Rider
+from sim_twin.controller.process import ControllerProcess
+from sim_twin.controller.server import Setup
+from sim_twin.controller.trace import read_trace
 from tests.support.genuine_client import HOME, make_station, until
 from tests.support.loopback import own_address
 
@@ -14,9 +26,32 @@ pytestmark = pytest.mark.realtime
 pytest.importorskip("rtde_control", reason="the genuine client comes with `pip install autotelic[lab]`")
 
 JOG_RAD = 0.3
+X = np.array([1.0, 0, 0, 0, 0, 0])
 FEWEST_HZ = 2.0
 """Of the watchdog, so that a busy machine does not bring it about."""
 LOOKAHEAD_S, GAIN = 0.1, 300.0
+SCRIPTS = 30002
+SLOW = """\
+def slow():
+  write_output_integer_register(0, 0)
+  movej([{there}], a=2.0, v=1.0)
+  sleep(0.8)
+  before = read_input_float_register(0)
+  write_output_integer_register(0, 1)
+  while read_input_integer_register(0) != 11 or read_input_float_register(0) == before:
+    sync()
+  end
+  q = [0, 0, 0, 0, 0, 0]
+  i = 0
+  while i < 6:
+    q[i] = read_input_float_register(i)
+    i = i + 1
+  end
+  movej(q, a=2.0, v=1.0)
+end
+"""
+"""Busy with something else before it is ready for a command; then it obeys the next, as the client's own does."""
+OTHERS = "def others():\n  while True:\n    sync()\n  end\nend\n"
 
 
 class Bare:
@@ -57,7 +92,7 @@ class Bare:
 
 @pytest.fixture
 def opened():
-    """A controller of its own: what a client was led to must lead no other test astray."""
+    """A controller and a client for each test: what a client was led to must not lead the next astray."""
     with make_station(own_address()) as station:
         yield station
 
@@ -74,3 +109,79 @@ def test_a_script_that_is_uploaded_again_servoes_to_the_target_from_before_the_s
     jogged = bare.jog()
     assert bare.control.reuploadScript()
     assert until(lambda: bare.is_near(jogged - JOG_RAD), 5.0), f"{bare.q0_rad - jogged:.4f} rad"
+
+
+@pytest.mark.slow
+def test_a_command_that_waits_for_a_script_to_be_ready_is_sent_as_it_was_given(bare):
+    """Facts 1.12, 10: whoever checked how old a target is did so before the client waited, for up to 3 s."""
+    there = HOME + X * JOG_RAD
+    with socket.create_connection((bare.process.host, SCRIPTS)) as port:
+        port.sendall(SLOW.format(there=", ".join(map(str, there))).encode())
+        assert until(lambda: bare.q0_rad - HOME[0] > 0.01)
+        begun = time.monotonic()
+        old = HOME + X * 0.02
+        assert bare.control.servoJ(list(old), 0.0, 0.0, 0.002, LOOKAHEAD_S, GAIN)
+        waited_s = time.monotonic() - begun
+        assert until(lambda: bare.is_near(old[0]), 5.0), f"{bare.q0_rad - old[0]:.4f} rad"
+    assert 0.5 < waited_s < 3.0
+
+
+@contextmanager
+def served(**setup):
+    with ControllerProcess(Setup(host=own_address(), **setup)) as process:
+        yield process
+
+
+def upload(process, text):
+    with socket.create_connection((process.host, SCRIPTS)) as port:
+        port.sendall(text.encode())
+        assert until(lambda: process.fault("program")["text"].strip() == text.strip(), 10.0)
+
+
+@pytest.mark.slow
+def test_under_our_backend_a_command_that_has_to_wait_is_never_sent(tmp_path: Path):
+    """Whoever waits for more than some ticks is ended, and what it waited with is not sent: no way back."""
+    trace = tmp_path / "trace"
+    with served(trace=str(trace)) as process, Rider(process.host) as rider:
+        rider.take()
+        assert rider.ride(0.3) is None
+        there = np.array(process.fault("truth")["q_rad"]) + X * JOG_RAD
+        upload(process, SLOW.format(there=", ".join(map(str, there))))
+        raised = rider.ride(3.0)
+        assert raised is not None
+        time.sleep(3.0)
+        q0_rad = read_trace(trace, since_s=raised.at_s)[:, 3]
+        assert q0_rad.max() - q0_rad[-1] < 5e-3, raised
+
+
+@pytest.mark.slow
+def test_our_backend_arms_the_watchdog_at_each_engagement_and_has_no_speed_that_goes_on():
+    from robot.hal.rtde import RtdeArm
+
+    with served() as process:
+        arm = RtdeArm(arm=load_arm("ur5e"), address=process.host)
+        arm.connect()
+        try:
+            for _ in range(2):
+                arm.engage()
+                before = process.fault("truth")["q_rad"]
+                assert until(lambda: process.fault("truth")["runtime"] == "STOPPED", 1.0), "nobody writes"
+                assert process.fault("truth")["q_rad"] == pytest.approx(before, abs=1e-3)
+                arm.stop()
+        finally:
+            arm.close()
+
+
+@pytest.mark.slow
+def test_our_backend_connects_and_looks_while_somebody_elses_program_runs_on():
+    from robot.hal.rtde import RtdeArm
+
+    with served() as process:
+        upload(process, OTHERS)
+        assert until(lambda: process.fault("truth")["runtime"] == "PLAYING")
+        arm = RtdeArm(arm=load_arm("ur5e"), address=process.host)
+        arm.connect()
+        arm.read()
+        arm.close()
+        assert process.fault("truth")["runtime"] == "PLAYING"
+        assert "others" in process.fault("program")["text"]
