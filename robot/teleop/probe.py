@@ -85,7 +85,7 @@ def probe_rig(resolved: Resolved, wanted: Wanted) -> Answer:
             **msgspec.structs.asdict(bench_report("probe", rows, seconds=perf_counter() - begin)),
             rig=resolved.rig.name, profile=resolved.rig.profile, plant=observer.identity,
             address=resolved.rig.address or "", armed_by=getattr(operator, "name", type(operator).__name__),
-            n_probes=len(probes), n_done=len(carried), ended=ended,
+            n_probes=len(probes), n_done=sum(each.is_done for each in carried), ended=ended,
         )  # fmt: skip
     text = msgspec.json.encode(report).decode()
     if wanted.out is not None:

@@ -53,6 +53,11 @@ class Carried(msgspec.Struct, frozen=True, kw_only=True):
     sights: tuple[Sight, ...]
     """What was seen of the arm meanwhile, in order."""
 
+    @property
+    def is_done(self) -> bool:
+        """Whether it came to its end: a silence ends with a refusal, nothing else does."""
+        return bool(self.marks.refusal) is (self.probe.kind is Kind.SILENCE)
+
 
 def judge_probe(carried: Carried, stopping: Stopping) -> tuple[BenchResult, ...]:
     """Return the figures of one probe, each with what it is asked to be.

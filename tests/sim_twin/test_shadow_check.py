@@ -106,7 +106,7 @@ def test_the_probe_list_moves_the_virtual_arm_as_it_says_by_the_twins_own_joints
     for _ in range(N_TRIES):
         machine, begun_s = Overbooked(), time.monotonic()
         code, out, err = check(folder, "--probe", "--json", "--out", "kept")
-        report = json.loads(out)
+        report = json.loads(out) if out else {"ended": err, "results": ()}  # an arm that was not taken moved nothing
         if code == 0 or machine.share() < OVERBOOKED_SHARE:
             break
     else:

@@ -144,6 +144,12 @@ def test_a_turn_is_of_one_joint_and_as_far_as_asked(q5, q0, bad):
     assert [row.name.removeprefix("wrist_3_") for row in came.values() if not row.ok] == bad
 
 
+@pytest.mark.parametrize("probe", [LINE, SILENCE], ids=lambda probe: probe.name)
+def test_a_probe_is_done_at_its_end_which_is_a_refusal_of_silence_alone(probe):
+    done = {why: Carried(probe=probe, marks=marks(refusal=why), sights=()).is_done for why in ("", "stale_intent")}
+    assert done == {"": probe is LINE, "stale_intent": probe is SILENCE}
+
+
 def test_a_refused_step_and_an_arm_that_was_not_seen_fail_whatever_else_came():
     came = figures(LINE, went(LINE, 0.04), refusal="fence: beyond")
     assert not came["y_refused"].ok
