@@ -11,7 +11,7 @@ import msgspec
 
 from config.resolved import Resolved
 from robot.bench import BenchResult
-from robot.bus import open_session
+from robot.bus import Bus, Role
 from robot.bus.twin_link import RemoteTruth
 from robot.errors import RobotConfigError, SafetyError
 from robot.hal.sight import Observer, Watched
@@ -78,8 +78,8 @@ def perceived(resolved: Resolved) -> tuple[ObjectPose, ...]:
     rig = resolved.rig
     if rig.perception is None or rig.bus is None:
         return ()
-    with closing(open_session(rig.bus, is_hub=False)) as session:
-        truth = RemoteTruth(session, rig.expected.serial)
+    with Bus(rig.bus, serial=rig.expected.serial, role=Role.VIEWER, keys=rig.keys) as bus:
+        truth = RemoteTruth(bus)
         truth.wait_next()
         return truth.read().objects
 
