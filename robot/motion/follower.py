@@ -34,8 +34,8 @@ RATE_SHARE = 0.97
 ALIGN_RAD = 0.01
 """A tool tilted or turned by less than this points down as far as motion cares; the next ticks set it right."""
 SWIFT_TICK_S = 0.005
-"""In shorter ticks than this, a real arm's and not the twin's, a new target is gone to one tick after it was set, and the
-mover finds it piece by piece: the tick in which an intent begins has enough to do."""
+"""In shorter ticks than this, a real arm's and not the twin's, a new target is gone to one tick after it was set, and
+the mover finds it piece by piece: the tick in which an intent begins has enough to do."""
 STILL_RAD_S = 1e-3
 ALIGN_STEP_RAD = 0.35
 """Greatest change of any joint's target in one step while the tool is brought upright."""
