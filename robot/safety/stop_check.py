@@ -1,7 +1,5 @@
 """Whether the arm could be stopped after a command before it leaves its limits or comes too near to anything."""
 
-import math
-
 from config.arm import ArmConfig
 from robot.chain import ToolChain, chain_points, lowest_fingertip
 from robot.compiled import Table, compiled
@@ -10,6 +8,7 @@ from robot.messages import ArmState, Box3, Vec3, Vec6
 from robot.safety.blocks import Block
 from robot.safety.checks import Reason, Refusal
 from robot.safety.clearance import Clearance
+from robot.safety.cover import N_SEEN, covered_share, nothing_seen
 from robot.safety.limits import GateLimits
 from robot.safety.stopping import Braking
 from robot.safety.sweep import Links, Sweep, swept_m
@@ -22,34 +21,35 @@ TINY_M = 1e-6
 OVERRUN_M = 0.003
 """How far a stop may overrun the fences: less than the fingertips' least height over the table."""
 
-Known = tuple[float, float, float]
-"""Bounds where the last command led: on the gap, and how far the tool is inside its fences, every joint its range."""
-Seen = tuple[Vec6, float]
-"""Joints at which a stop would have ended at the worst, and the gap there."""
-NOTHING_SEEN: Seen = ((0.0, 0.0, 0.0, 0.0, 0.0, 0.0), -math.inf)
+MOST_LOOKS = 5
+"""A way that is not proved free by so many new gaps leads near to something, and is looked at closely."""
+STRIDE = 0.95
+"""Of the farthest gap that is told: so far beyond what is proved the next gap is asked for."""
+
+Known = tuple[float, float]
+"""Bounds where the last command led: how far the tool is inside its fences, every joint its range."""
 
 
 @compiled
 def _looked_ahead(
-    q_rad: Vec6, before_rad: Vec6, known: Known, seen: Seen, far_m: Vec6, links_m: Links, law: Vec3
-) -> tuple[Known, bool, Vec6, bool, Vec6, float]:
+    q_rad: Vec6, before_rad: Vec6, known: Known, seen: Table, far_m: Vec6, links_m: Links, law: Vec3
+) -> tuple[Known, bool, Vec6, float, Vec6, float]:
     """Return what a command leads to when the arm is stopped after it.
-
-    On a way of length L with gaps of at least g and h at its ends, no gap is less than (g + h - L) / 2.
 
     Args:
         q_rad: the command.
         before_rad: the one before.
         known: what was known there.
-        seen: where a stop was looked at last.
+        seen: gaps that were found lately (cover).
         far_m: reaches of Sweep.
         links_m: the rest of them.
         law: a stop turns a joint on by its step times the fastest joint's step times the first; at the worst the second
             times as far; and before that it goes on for so many ticks.
 
     Returns:
-        What is known at the command; whether a limit may be near, and where the arm comes to rest as it should; whether
-        a body may be near, where it comes to rest at the worst, and how far no point of it goes until then.
+        What is known at the command; whether a limit may be near, and where the arm comes to rest as it should; what
+        share of the way to where it comes to rest at the worst is free of bodies for sure (covered_share), where that
+        is, and how far no point of it goes until then.
     """
     step = difference(q_rad, before_rad)
     fastest = 0.0
@@ -57,16 +57,14 @@ def _looked_ahead(
         fastest = max(fastest, abs(s))
     stretch, weaker, lead = law
     moved_m = swept_m(step, far_m, links_m)
-    room_m, fence_m, range_rad = known[0] - moved_m, known[1] - moved_m, known[2] - fastest
+    fence_m, range_rad = known[0] - moved_m, known[1] - fastest
     share = fastest * stretch + lead
     is_limit_near = not (fence_m > moved_m * share and range_rad > fastest * share)
     rest = stepped(q_rad, step, share)
     share = fastest * stretch * weaker + lead
     ahead_m, end = moved_m * share, stepped(q_rad, step, share)
-    end_m = seen[1] - swept_m(difference(end, seen[0]), far_m, links_m)
-    room_m = max(room_m, end_m - ahead_m)
-    is_body_near = not (room_m > ahead_m or room_m + end_m > ahead_m)
-    return (room_m, fence_m, range_rad), is_limit_near, rest, is_body_near, end, ahead_m
+    covered = covered_share(q_rad, end, ahead_m, seen, far_m, links_m)
+    return (fence_m, range_rad), is_limit_near, rest, covered, end, ahead_m
 
 
 @compiled
@@ -116,10 +114,10 @@ def _stayed_inside(
 
 
 class StopCheck:
-    """The stopping trajectory of every command, verified. Memory: bounds on the gap where commands and stops led.
+    """The stopping trajectory of every command, verified. Memory: the gaps found last, and how far limits were.
 
     Nothing of the arm moves farther than the joints' turns times their reaches, so that a gap found at one posture is
-    a bound on the gaps near it, and most ticks need no evaluation, the others one or two. Angles and workspace are
+    a bound on the gaps near it, and most ticks need no evaluation, nearly all others one. Angles and workspace are
     asked of where the arm comes to rest, bodies of the whole way there, braking at its worst.
     """
 
@@ -152,19 +150,18 @@ class StopCheck:
 
     def seed(self) -> None:
         """Forget what was found: the next command is looked at afresh."""
-        self._room_m = 0.0
-        """The gap is at least this where the last command led, the tool so far inside its fences,"""
         self._fence_m = 0.0
+        """Where the last command led the tool is so far inside its fences at least,"""
         self._range_rad = 0.0
         """and every joint so far inside its range."""
-        self._seen: Seen = NOTHING_SEEN
+        self._seen, self._n_seen = nothing_seen(), 0
         self._at: Vec6 | None = None
         """Where the last command led that was looked at."""
 
     def put(self, blocks: tuple[Block, ...]) -> None:
         """Take things to be where they are now: what was found of gaps holds no more."""
         self._clearance.put(blocks)
-        self._room_m, self._seen = 0.0, NOTHING_SEEN
+        self._seen = nothing_seen()
 
     def check(self, q_rad: Vec6, before_rad: Vec6, state: ArmState) -> Refusal | None:
         """Refuse joints from which a stop would end outside the limits or pass too near to something.
@@ -189,23 +186,39 @@ class StopCheck:
 
     def _check_step(self, q_rad: Vec6, before_rad: Vec6, from_rad: Vec6) -> Refusal | None:
         """Look at the stop of a command that is as fast as if it came from some joints in one tick."""
-        sweep, known = self._sweep, (self._room_m, self._fence_m, self._range_rad)
-        known, is_limit_near, rest, is_body_near, end, ahead_m = _looked_ahead(
+        sweep, known = self._sweep, (self._fence_m, self._range_rad)
+        known, is_limit_near, rest, covered, end, ahead_m = _looked_ahead(
             q_rad, from_rad, known, self._seen, sweep.far_m, sweep.links_m, self._law
         )
-        self._room_m, self._fence_m, self._range_rad = known
+        self._fence_m, self._range_rad = known
         if is_limit_near:
             refusal = self._check_limits(q_rad, rest)
             if refusal is not None:
                 return refusal
-        if not is_body_near:
+        if covered > 1.0 or self._is_free(q_rad, end, ahead_m, covered):
             return None
-        least_m = self._clearance.gap(end)
-        self._seen = end, least_m
-        self._room_m = max(self._room_m, least_m - ahead_m)
-        if self._room_m + least_m > ahead_m:
-            return None
-        return self._check_way(q_rad, end, least_m, ahead_m, before_rad)
+        return self._check_way(q_rad, end, self._gap(end), ahead_m, before_rad)
+
+    def _is_free(self, q: Vec6, end: Vec6, length_m: float, covered: float) -> bool:
+        """Return whether few gaps more prove a way free, each asked for beyond what is proved already."""
+        sweep, stride = self._sweep, STRIDE * self._clearance.most_m / length_m if length_m > 0.0 else 1.0
+        for _ in range(MOST_LOOKS):
+            share, before = min(1.0, covered + stride), covered
+            if self._gap(between(q, end, share)) <= 0.0:
+                return False
+            covered = covered_share(q, end, length_m, self._seen, sweep.far_m, sweep.links_m)
+            if covered > 1.0:
+                return True
+            if covered <= before:
+                stride /= 2.0
+        return False
+
+    def _gap(self, q: Vec6) -> float:
+        """Return the gap at joints, and remember it."""
+        gap_m = self._clearance.gap(q)
+        self._seen[self._n_seen % N_SEEN] = (*q, gap_m)
+        self._n_seen += 1
+        return gap_m
 
     def _check_limits(self, q: Vec6, end: Vec6) -> Refusal | None:
         """Look at where the arm comes to rest, and take note of how far inside its limits the command is."""
@@ -232,9 +245,8 @@ class StopCheck:
 
     def _check_way(self, q: Vec6, end: Vec6, end_gap_m: float, length_m: float, before: Vec6) -> Refusal | None:
         """Look closely: at the command and then between, until bounds meet. What is too near already may part."""
-        gap = self._clearance.gap
+        gap = self._gap
         here_m = gap(q)
-        self._room_m = here_m
         floor_m = 0.0
         if here_m < 0.0 or end_gap_m < 0.0:
             floor_m = min(0.0, gap(before) - TINY_M)

@@ -148,13 +148,18 @@ def test_a_command_that_falls_back_to_the_arm_drives_it_no_faster_than_it_goes()
 
 
 def test_after_seeding_everything_is_looked_at_afresh():
-    check = _check(lambda turn: 0.05)
-    assert check.check(_turned(1e-4), START, STATE) is None
+    bodies = Bodies(lambda turn: 0.05)
+    check = StopCheck(ARM, bodies, limits=LIMITS, tick_s=TICK_S, braking=BRAKING)
+    for k in range(1, 4):
+        assert check.check(_turned(1e-4 * k), _turned(1e-4 * (k - 1)), STATE) is None
+    assert bodies.n_asked == 1
     check.seed()
-    assert check._room_m == 0.0 == check._fence_m
+    assert check._fence_m == 0.0
+    assert check.check(_turned(4e-4), _turned(3e-4), STATE) is None
+    assert bodies.n_asked == 2
 
 
 def test_the_arm_s_own_table_lets_a_working_posture_move():
     check = StopCheck(ARM, CLEARANCE, limits=LIMITS, tick_s=TICK_S, braking=BRAKING)
     assert check.check(_turned(0.005), START, STATE) is None
-    assert not math.isnan(check._room_m)
+    assert not math.isnan(check._fence_m)

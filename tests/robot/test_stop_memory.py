@@ -165,6 +165,17 @@ def test_beside_a_wall_at_little_more_than_its_stop_an_arm_looks_at_every_other_
     assert 1 <= bodies.n_asked <= n_ticks // 2
 
 
+def test_far_from_everything_an_arm_whose_stop_is_longer_than_it_sees_looks_once_a_tick_at_the_most():
+    """Of the way to where a stop ends nearly all was proved free in the ticks before."""
+    step, n_ticks = 0.02, 40
+    check, bodies = walled(9.0)
+    assert Wall.reach_m * step * step / (2.0 * 8.0 * TICK_S**2) > 2.0 * bodies.most_m
+    for k in range(1, n_ticks + 1):
+        n_before = bodies.n_asked
+        assert check.check(turned(step * k), turned(step * (k - 1)), STATE) is None
+        assert bodies.n_asked - n_before <= (1 if k > 1 else 6)
+
+
 def test_what_was_seen_of_a_stop_counts_no_more_once_a_thing_is_put_elsewhere():
     step = 2e-3
     check, bodies = walled(9.0)
