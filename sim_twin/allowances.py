@@ -8,11 +8,12 @@ stack happened to do:
   else: for what was asked of the plant no plant is an excuse. A chord of one tick is never longer than the path;
 * the servo: joints follow set-points as a mass on a spring with damping below critical: 0.43 of it where the shoulder
   holds the stretched arm (6 kNm/rad, 130 Nms/rad, 4 kgm²). A step of speed overshoots by exp(-π ζ / √(1 - ζ²)), 22 %,
-  and no other set-points of bounded speed by more per joint. So speeds of the joints and points themselves are held
-  to that; a real arm's servo is stiffer and overshoots less;
+  and that is allowed to joints and points. Set-points that swing at the servo's own rate could add up to more, which
+  counts as broken; a real arm's servo is stiffer and overshoots less;
 * links and tool longer by e each: a point of the arm is off by at most three times e;
 * a payload that nobody compensates: joints droop by its torque over their stiffness;
-* fingers meet soft end stops.
+* fingers meet soft end stops;
+* postures that set-points ask for bow by a millimetre between two targets of a tool that goes straight.
 """
 
 import msgspec

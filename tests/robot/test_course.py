@@ -88,3 +88,23 @@ def test_a_seed_is_rest():
     course.seed(at(1.0))
     assert course.is_at_rest
     assert refused(course, 1.0 + 2.0 * GAIN) is Reason.JOINT_ACCELERATION
+
+
+def test_what_gave_way_may_go_on_at_its_speed_though_that_is_too_much_from_rest():
+    course, x = went([1.12 * GAIN], pushed={0})
+    assert refused(course, x + 1.12 * GAIN) is None
+    course.seed(at(0.0))
+    assert refused(course, 1.12 * GAIN) is Reason.JOINT_ACCELERATION
+
+
+def test_who_kept_to_no_course_and_gave_way_goes_on_from_the_true_one_or_from_rest_and_no_other():
+    course, x = went([-1.12 * GAIN, 1.12 * GAIN], pushed={0, 1})
+    assert refused(course, x + 1.12 * GAIN) is Reason.JOINT_JERK
+    assert refused(course, x + 0.9 * GAIN) is None
+
+
+@pytest.mark.parametrize(("more", "passes"), [(0.99, True), (1.5, False)])
+def test_what_is_pushed_against_its_way_gains_no_more_on_its_last_step_than_any(more, passes):
+    course, x = went([GAIN, 2.0 * GAIN, 3.0 * GAIN])
+    came = refused(course, x + (3.0 + more) * GAIN, at(x))
+    assert came is (None if passes else Reason.JOINT_ACCELERATION)

@@ -63,6 +63,17 @@ def test_a_force_at_the_bound_passes_and_the_next_float_does_not():
     assert check_free(math.nan).reason is Reason.PAYLOAD
 
 
+def test_refusals_say_what_was_expected_what_came_and_what_to_look_at():
+    assert check_free(23.456).detail == (
+        "expected at most 20 N on a tool that has not moved yet, came 23.5: is the payload that of the hand, was the "
+        "sensor zeroed under load, does something push?"
+    )
+    assert check_tool_speed((0.1234567, 0.0, 0.0), (0.0, -0.0123456, 0.5)).detail == (
+        "expected the controller's tool speed within 0.0362 m/s of ours, came 0.515: ours (0.123, 0.0, 0.0), its own "
+        "(0.0, -0.012, 0.5) m/s; are its tool centre point and calibration the file's?"
+    )
+
+
 JOINT = st.floats(-1.0, 1.0)
 
 

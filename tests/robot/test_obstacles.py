@@ -8,9 +8,9 @@ from msgspec.structs import replace
 from config.loader import resolve
 from robot.messages import GripState
 from robot.safety.blocks import AWAY, LidState
-from robot.safety.lids import SETTLING_S, LidWatch
+from robot.safety.lids import HAND_M, SETTLING_S, LidWatch
 from robot.safety.obstacles import MOVED_M, Obstacles, blocks_of
-from robot.surroundings import HELD_M, Lookout
+from robot.surroundings import HELD_M, Lookout, Place, Surroundings
 from tests.support.stations import percept
 
 SCENARIO = resolve().scenario
@@ -232,3 +232,75 @@ def test_a_box_that_is_turned_has_its_leaves_where_they_are(table):
     x, y, _ = block(table, f"{BOX.name}/leaf_near").centre_m
     assert x == pytest.approx(0.5, abs=1e-6)
     assert y == pytest.approx(-0.11, abs=0.015)  # what looked to -x looks to -y
+
+
+RAISED = replace(SCENARIO, table=replace(SCENARIO.table, height_m=0.1))
+YAW = 0.5
+LEAF_M = (BOX.inner_m[0] + BOX.wall_m) / 2
+OUT_M = LEAF_M * max(0.0, -math.cos(BOX.lid.open_angle_rad)) + BOX.lid.thickness_m + BOX.lid.padding_m
+HALF_M = (BOX.inner_m[0] / 2 + BOX.wall_m + OUT_M, BOX.inner_m[1] / 2 + BOX.wall_m)
+HIGH_M = BOX.height_m + LEAF_M + BOX.lid.thickness_m + BOX.lid.padding_m
+
+
+def raised(places, *, is_full=False, at=(0.48, 0.07), yaw=YAW):
+    """A table 0.1 m up whose box was perceived at a place, turned, or nowhere, its lid asked to open."""
+    made = Obstacles(RAISED)
+    made.seed(0, 0)
+    quat = (math.cos(yaw / 2), 0.0, 0.0, math.sin(yaw / 2))
+    seen = dict(places)
+    if at is not None:
+        seen[BOX.name] = Place(position_m=(*at, 0.1), quat=quat)
+    made.perceive(Surroundings(stamp_ns=0, places=tuple(seen.get(name) for name in PLACES), is_hand_full=is_full))
+    made.watch(BIT, FAR, 10**9)
+    return made
+
+
+def from_box(x, y, z, at=(0.48, 0.07), yaw=YAW):
+    """Where a place in the box's frame is."""
+    c, s = math.cos(yaw), math.sin(yaw)
+    return at[0] + c * x - s * y, at[1] + s * x + c * y, 0.1 + z
+
+
+@pytest.mark.parametrize("corner", [(1, 1), (1, -1), (-1, 1), (-1, -1)])
+@pytest.mark.parametrize(("at", "yaw"), [((0.48, 0.07), YAW), (None, 0.0)], ids=["perceived", "unseen"])
+def test_a_hand_at_a_corner_of_what_leaves_sweep_is_in_their_way_and_a_millimetre_beyond_is_not(corner, at, yaw):
+    place = at or BOX.position_m
+    for axis, by, is_settled in ((0, -1e-3, False), (0, 1e-3, True), (1, 1e-3, True)):
+        x, y = (sign * (half + HAND_M - 1e-3) for sign, half in zip(corner, HALF_M, strict=True))
+        x, y = (x + corner[0] * (by + 1e-3), y) if axis == 0 else (x, y + corner[1] * (by + 1e-3))
+        table = raised({}, at=at, yaw=yaw)
+        assert table.watch(BIT, from_box(x, y, 0.1, place, yaw), 10**9 + TRAVEL_NS) is is_settled, (axis, by)
+
+
+@pytest.mark.parametrize(
+    ("is_full", "by", "is_settled"), [(False, 0.02, True), (True, 0.02, False), (True, 0.031, True)]
+)
+def test_a_full_hand_is_in_the_way_of_leaves_from_higher_up(is_full, by, is_settled):
+    table = raised({}, is_full=is_full)
+    assert table.watch(BIT, from_box(0.0, 0.0, HIGH_M + by), 10**9 + TRAVEL_NS) is is_settled
+
+
+@pytest.mark.parametrize(("by", "is_settled"), [(-1e-4, False), (1e-4, True)])
+def test_a_loose_thing_holds_up_leaves_as_far_off_as_its_longest_half(by, is_settled):
+    radius_m = math.hypot(CYLINDER.diameter_m, CYLINDER.height_m) / 2
+    place = Place(position_m=from_box(HALF_M[0] + radius_m + by, 0.0, 0.1), quat=(1.0, 0.0, 0.0, 0.0))
+    assert raised({CYLINDER.name: place}).watch(BIT, FAR, 10**9 + TRAVEL_NS) is is_settled
+
+
+@pytest.mark.parametrize(("by", "is_moved"), [(1e-3, False), (math.nextafter(1e-3, 1.0), True)])
+def test_what_turned_by_a_thousandth_has_not_moved_and_the_next_float_has(table, by, is_moved):
+    def seen(turn):
+        quat = (1.0, turn, 0.0, 0.0)
+        places = (Place(position_m=(0.4, 0.0, 0.1), quat=quat) if n == CYLINDER.name else None for n in PLACES)
+        return Surroundings(stamp_ns=0, places=tuple(places), is_hand_full=False)
+
+    assert table.perceive(seen(0.0))
+    assert table.perceive(seen(by)) is is_moved
+
+
+def test_blocks_of_what_is_perceived_are_turned_with_it_and_those_for_fingers_stay_theirs():
+    table = raised({})
+    near, standing = block(table, BOX.name), block(table, f"{BOX.name}/leaf_near/standing")
+    assert near.quat == pytest.approx((math.cos(YAW / 2), 0.0, 0.0, math.sin(YAW / 2)))
+    assert standing.is_for_fingers is True
+    assert near.is_for_fingers is False
