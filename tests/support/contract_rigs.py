@@ -1,5 +1,6 @@
 """Rigs as the contract suite sees them: how their plants and stations come to be, and what they promise of time."""
 
+import gc
 from contextlib import ExitStack
 from functools import cached_property
 
@@ -186,13 +187,16 @@ class WireWorld:
     def renew(self):
         """Let a failed test be repeated, on another plant and record: one that saw its link stall may be used no more.
 
-        A process of its own would end; here the client is dropped, so that it cannot go on by itself.
+        A process of its own would end; here the clients are dropped, so that they cannot go on by themselves and keep
+        the registers that the next ones need: a traceback that is told holds the arm, and the arm would hold them.
         """
         self.recording = None
         plant = self.__dict__.pop("_plant", None)
         if plant is not None:
             plant.arm.close()
-            plant.arm._command.control = None
+            command = plant.arm._command
+            command.control = command.outputs = None
+        gc.collect()  # an error and the frames that it came through hold one another, and a client with them
 
     def close(self):
         self._open.close()
