@@ -14,7 +14,7 @@ from tests.support.overbooked import Overbooked
 
 pytestmark = pytest.mark.realtime
 
-ESSENTIAL = ("interfaces_frozen_1s", "servo_process_hung_and_jogged", "rtde_dropped")
+ESSENTIAL = ("interfaces_frozen_1s", "rtde_dropped")
 REASONS = {
     "link": "stale_state",
     "rtde": "stale_state",
