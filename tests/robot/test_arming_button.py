@@ -35,6 +35,12 @@ def test_a_press_counts_once_it_has_settled_after_a_settled_release():
     assert seen([False] * 4 + [True] * 5) == [7, 8]
 
 
+def test_two_looks_at_one_instant_are_no_gap():
+    watch, looks = PressWatch(), ((False, 0), (False, SETTLE_NS), (False, SETTLE_NS), (True, SETTLE_NS + 1))
+    assert not any(watch.see(is_on=is_on, now_ns=now_ns) for is_on, now_ns in looks)
+    assert watch.see(is_on=True, now_ns=2 * SETTLE_NS + 1)
+
+
 def test_a_button_held_from_before_does_not_count_until_it_was_let_go():
     assert seen([True] * 50) == []
     assert seen([True] * 10 + [False] * 4 + [True] * 4) == [17]
