@@ -46,6 +46,10 @@ class Button(Section, frozen=True, kw_only=True):
     diameter_m: Span = 0.1
     height_m: Span = 0.05
     travel_m: Annotated[float, Meta(ge=0.002, le=0.03)] = 0.01
+    cap_m: Annotated[float, Meta(ge=0.002, le=0.05)] = 0.012
+    """How much of its height, from the cap's edge down, wears the cap's colour."""
+    dome_m: Annotated[float, Meta(ge=0.0, le=0.03)] = 0.006
+    """How far the lit dome rises above the cap's edge, in its middle."""
     input: Annotated[int, Meta(ge=0, le=15)]
     lamp_output: Annotated[int, Meta(ge=0, le=15)]
 

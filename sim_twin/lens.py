@@ -11,7 +11,7 @@ import numpy as np
 from msgspec import Meta
 from numpy.typing import NDArray
 
-__all__ = ["TrueLens", "directions", "half_angles", "source_map"]
+__all__ = ["TrueLens", "bent_pixels", "directions", "half_angles", "source_map"]
 
 Array = NDArray[np.float64]
 N_STEPS = 60
@@ -44,6 +44,17 @@ def directions(lens: TrueLens) -> Array:
         if np.abs(step).max() < 1e-10:
             return straight.astype(np.float64)
     raise ValueError(f"a lens whose pictures fold: expected weaker distortion than {lens.radial}")
+
+
+def bent_pixels(lens: TrueLens, tangents: Array) -> Array:
+    """Return at which pixels directions are seen.  (n, 2) tangents -> (n, 2) px"""
+    x, y = tangents.T
+    (a, b), (p, q) = lens.radial, lens.tangential
+    square = x**2 + y**2
+    gain = 1.0 + a * square + b * square**2
+    u = x * gain + 2 * p * x * y + q * (square + 2 * x**2)
+    v = y * gain + p * (square + 2 * y**2) + 2 * q * x * y
+    return np.column_stack([u * lens.focal_px[0] + lens.centre_px[0], v * lens.focal_px[1] + lens.centre_px[1]])
 
 
 def half_angles(tangents: Array) -> tuple[float, float]:

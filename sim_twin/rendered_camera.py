@@ -93,6 +93,16 @@ class RenderedCamera:
         self._waiting.clear()
         self._n_taken, self._next_ns = 0, -1
 
+    def adjust(self, *, optics: Optics, T_bc: NDArray[np.float64], rng: np.random.Generator) -> None:
+        """Take the frames to come through another path of light, from another place, with other noise.
+
+        Raises:
+            ValueError: a sharpness other than the one it was made with.
+        """
+        if optics.sharpness != self._optics.sharpness:
+            raise ValueError(f"camera {self.spec.name}: expected sharpness {self._optics.sharpness:g} as it was made")
+        self._optics, self.T_bc, self._rng = optics, T_bc, rng
+
     def read(self, now_ns: int) -> Frame | None:
         """Return the newest frame that has arrived by now and was not returned before, or None.
 
@@ -135,6 +145,9 @@ class RenderedCamera:
     def _light(self) -> NDArray[np.float64]:
         """Return what falls on the sensor while the shutter is open, 0 to 255.  -> (height, width, 3)"""
         n, data, own = self._optics.n_smear, self._data, self._own
+        # With sleeping on, what cannot move is placed by a reset and never again: a table laid out anew was drawn as
+        # it had been when the camera was made.
+        mujoco.mj_resetData(self._model, own)
         total = np.zeros((*self._sources.shape[:2], 3))
         for k in range(n):
             own.qpos[:], own.mocap_pos[:], own.mocap_quat[:] = data.qpos, data.mocap_pos, data.mocap_quat

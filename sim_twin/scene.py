@@ -110,7 +110,7 @@ def _add_camera(world: mujoco.MjsBody, *, eye: Point, target: Point) -> None:
 def _add_button(spec: mujoco.MjSpec, button: Button, table_m: float) -> None:
     """A cap on a preloaded spring inside a dark ring; the cap wears a dome."""
     radius = button.diameter_m / 2
-    cap_half = 0.006
+    cap_half = button.cap_m / 2
     base = spec.worldbody.add_body(name=on_table(button.name), pos=[*button.position_m, table_m])
     ring = button.height_m - button.travel_m - 2 * cap_half
     base.add_geom(
@@ -129,7 +129,8 @@ def _add_button(spec: mujoco.MjSpec, button: Button, table_m: float) -> None:
     )  # fmt: skip
     cap.add_geom(
         name=on_table(button.name, "dome"), type=mujoco.mjtGeom.mjGEOM_ELLIPSOID,
-        size=[radius * 0.97, radius * 0.97, 0.009], pos=[0, 0, cap_half - 0.003], rgba=[*button.colour, 1], **_LOOK,
+        size=[radius * 0.97, radius * 0.97, round(1.5 * button.dome_m, 9)], pos=[0, 0, cap_half - button.dome_m / 2],
+        rgba=[*button.colour, 1], **_LOOK,
     )  # fmt: skip
 
 

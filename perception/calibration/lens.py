@@ -5,6 +5,7 @@ D. C. Brown, "Close-range camera calibration", Photogrammetric Engineering 37(8)
 and the factor 2 of the tangential terms as in Heikkilä and Silvén, CVPR 1997.
 """
 
+import functools
 from typing import Annotated
 
 import numpy as np
@@ -20,6 +21,7 @@ Size = Annotated[int, Meta(ge=16, le=20_000)]
 Coefficient = Annotated[float, Meta(ge=-50.0, le=50.0)]
 N_NEWTON = 30
 CONVERGED = 1e-12
+STILL = 1e-14
 LEAST_DEPTH_M = 1e-6
 LEAST_CURVE = 1e-6
 """A lens that folds 1,000 focal lengths aside does not."""
@@ -73,7 +75,10 @@ def rays(lens: Lens, pixels: Array) -> Array:
             ],
             axis=1,
         )
-        xy = _within(xy - step / det[:, None], limit)
+        step /= det[:, None]
+        xy = _within(xy - step, limit)
+        if not (np.abs(step) > STILL).any():
+            break
     error = np.abs(_distorted(lens, xy) - aim).max(axis=1)
     is_found = (error < 1e-9) & (np.hypot(xy[:, 0], xy[:, 1]) < limit)
     return np.column_stack([np.where(is_found[:, None], xy, np.nan), np.ones(len(xy))])
@@ -108,6 +113,7 @@ def ray_jacobian(lens: Lens, xy: Array) -> Array:
     return J
 
 
+@functools.lru_cache(maxsize=64)
 def fold_radius(lens: Lens) -> float:
     """Return the undistorted radius from which on the radial polynomial falls again; infinite where it never does.
 

@@ -9,6 +9,7 @@ import mujoco
 import numpy as np
 import pytest
 
+from config.loader import resolve
 from perception.calibration.board import board_picture
 from perception.calibration.intrinsics import fit_lens
 from perception.calibration.sighting import Finder
@@ -16,6 +17,7 @@ from robot.errors import WireError
 from robot.frames import CameraSpec, picture_of
 from sim_twin.board_stage import Sheet, board_stage
 from sim_twin.lens import TrueLens, directions, half_angles, source_map
+from sim_twin.plant import TwinPlant
 from sim_twin.render import NoGLError
 from sim_twin.rendered_camera import Optics, RenderedCamera, develop
 from tests.support.boards import BOARD, LESSER_LENS, MARGIN_M, good_views, matrices, projected
@@ -130,6 +132,28 @@ def test_a_rendered_board_is_seen_where_the_lens_puts_it_and_no_half_pixel_aside
 
 
 @pytest.mark.gl
+def test_a_table_that_was_laid_out_anew_is_drawn_where_things_are_now():
+    if GL not in ("egl", "osmesa"):
+        pytest.skip("needs MUJOCO_GL=egl or osmesa before MuJoCo is imported")
+    resolved = resolve()
+    plant = TwinPlant(arm=resolved.arm, scenario=resolved.scenario, rig=resolved.rig)
+
+    def camera():
+        made = RenderedCamera(
+            model=plant.world.model, data=plant.world.data, spec=SPEC, lens=TRUE, T_bc=downward(),
+            optics=Optics(sharpness=1.0), rng=np.random.default_rng(5),
+        )  # fmt: skip
+        made.connect()
+        return made
+
+    plant.resetter.reset(seed=1, epoch=0, digital_out=0)
+    early = camera()
+    before = early.read(0).pixels
+    plant.resetter.reset(seed=2, epoch=0, digital_out=0)
+    assert early.read(40 * MS).pixels == camera().read(40 * MS).pixels != before
+
+
+@pytest.mark.gl
 @pytest.mark.slow
 def test_a_lens_is_calibrated_from_rendered_boards_alone():
     T_bc = downward()
@@ -156,4 +180,4 @@ def test_what_renders_passes_in_a_process_that_may_draw():
     if "expected an off-screen GL" in done.stdout:
         pytest.skip("no off-screen GL here")
     assert done.returncode == 0, done.stdout
-    assert "3 passed" in done.stdout
+    assert "4 passed" in done.stdout

@@ -1,0 +1,122 @@
+"""Loose cylinders: every patch of the right colour is tried as one that stands and as one that lies."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from config.scenario import Cylinder
+from perception.calibration.lens import Array
+from perception.detection.eye import Eye
+from perception.detection.glance import Glance
+from perception.detection.hiding import Hiders
+from perception.detection.seen import Stance, ThingSeen
+from perception.detection.shapes import hull, lying_points, standing_points
+from perception.detection.silhouette import Fit, fit_silhouette
+from perception.opencv import opencv
+
+__all__ = ["CylinderFinder"]
+
+LEAST_OVERLAP = 0.8
+LEAST_VISIBLE = 0.4
+SURE_OVERLAP = 0.92
+"""A standing cylinder that fits so well is not tried lying."""
+LEAST_LEAD = 0.04
+"""By so much the better stance must fit better to be told."""
+LEAST_PATCH = 0.15
+"""Share of a cylinder's own area that a patch must have."""
+N_PATCHES = 3
+N_AXES = 6
+
+
+class CylinderFinder:
+    """Finds one cylinder of a scenario through one camera."""
+
+    def __init__(self, cylinder: Cylinder, table_m: float, eye: Eye, bit: int) -> None:
+        self._cylinder, self._eye, self._bit, self._table_m = cylinder, eye, bit, table_m
+        self._standing = standing_points(cylinder)
+
+    def find(self, seen: Glance, hiders: Hiders) -> ThingSeen:
+        """Return where the cylinder is; unknown where nothing of its colour has its shape."""
+        mask = seen.mask(self._bit)
+        things = [self._try(part, origin, hiders) for part, origin in self._patches(mask, seen.origin)]
+        told = [thing for thing in things if thing is not None]
+        return max(told, key=lambda thing: thing.confidence * thing.visible, default=self._unseen())
+
+    def _patches(self, mask: NDArray[np.uint8], origin: Array) -> list[tuple[NDArray[np.uint8], Array]]:
+        """Return the largest patches, each alone in a window of its own with the window's first pixel."""
+        _, labels, stats, _ = opencv().connectedComponentsWithStats(mask, connectivity=4)
+        order = np.argsort(-stats[1:, 4])[:N_PATCHES] + 1
+        patches = []
+        for label in order.tolist():
+            left, upper, width, height, area = stats[label].tolist()
+            middle = origin + np.array([left + width / 2.0, upper + height / 2.0])
+            if area < LEAST_PATCH * self._area_px(middle):
+                continue
+            edge = max(width, height)
+            first = np.maximum([left - edge, upper - edge], 0)
+            part = labels[first[1] : upper + height + edge, first[0] : left + width + edge]
+            patches.append(((part == label).astype(np.uint8), origin + first))
+        return patches
+
+    def _area_px(self, middle: Array) -> float:
+        """Return how many pixels a standing cylinder has there."""
+        at = self._eye.on_plane(middle[None, :], self._table_m)[0]
+        outline = hull(self._eye.pixels(at + self._standing))
+        x, y = outline.T
+        return float(abs(x @ np.roll(y, 1) - y @ np.roll(x, 1)) / 2.0)
+
+    def _try(self, patch: NDArray[np.uint8], origin: Array, hiders: Hiders) -> ThingSeen | None:
+        stands = self._fit(self._standing, patch, origin, hiders)
+        lies: tuple[Fit, float] | None = None
+        if stands is None or stands.overlap < SURE_OVERLAP:
+            lies = self._lying(patch, origin, hiders)
+        best = stands if lies is None or (stands is not None and stands.overlap >= lies[0].overlap) else lies[0]
+        if best is None or best.overlap < LEAST_OVERLAP or best.visible < LEAST_VISIBLE:
+            return None
+        others = [f.overlap for f in (stands, None if lies is None else lies[0]) if f is not None and f is not best]
+        if best.overlap - max(others, default=0.0) < LEAST_LEAD:
+            return None  # the two stances are millimetres apart: neither place is known
+        if best is stands:
+            return self._thing(best, Stance.STANDING, None, self._cylinder.height_m / 2.0)
+        assert lies is not None
+        return self._thing(best, Stance.LYING, lies[1], self._cylinder.diameter_m / 2.0)
+
+    def _lying(self, patch: NDArray[np.uint8], origin: Array, hiders: Hiders) -> tuple[Fit, float] | None:
+        """Return the best fit over axes all round, then around the best of them, and its axis."""
+        best: tuple[Fit, float] | None = None
+        step = np.pi / N_AXES
+        for axis in np.arange(N_AXES) * step:
+            best = self._better(best, float(axis), patch, origin, hiders)
+        for _ in range(3):
+            step /= 2.0
+            if best is not None:
+                for axis in (best[1] - step, best[1] + step):
+                    best = self._better(best, axis, patch, origin, hiders)
+        return None if best is None else (best[0], best[1] % np.pi)
+
+    def _better(
+        self, best: tuple[Fit, float] | None, axis_rad: float, patch: NDArray[np.uint8], origin: Array, hiders: Hiders
+    ) -> tuple[Fit, float] | None:
+        fit = self._fit(lying_points(self._cylinder, axis_rad), patch, origin, hiders)
+        is_better = fit is not None and (best is None or fit.overlap > best[0].overlap)
+        return (fit, axis_rad) if fit is not None and is_better else best
+
+    def _fit(self, body: Array, patch: NDArray[np.uint8], origin: Array, hiders: Hiders) -> Fit | None:
+        rows, columns = np.nonzero(patch)
+        middle = np.array([[columns.mean(), rows.mean()]]) + origin
+        start = self._eye.on_plane(middle, self._table_m + float(body[:, 2].max()) / 2.0)[0]
+        if not np.isfinite(start).all():
+            return None
+        start[2] = self._table_m
+        return fit_silhouette(self._eye, body, start, patch, origin, hiders.before(start + body))
+
+    def _thing(self, fit: Fit, stance: Stance, axis_rad: float | None, above_m: float) -> ThingSeen:
+        x, y = fit.position_m
+        return ThingSeen(
+            name=self._cylinder.name, position_m=(x, y, self._table_m + above_m), stance=stance, axis_rad=axis_rad,
+            confidence=fit.overlap, visible=fit.visible,
+        )  # fmt: skip
+
+    def _unseen(self) -> ThingSeen:
+        return ThingSeen(
+            name=self._cylinder.name, position_m=None, stance=Stance.UNKNOWN, axis_rad=None, confidence=0.0, visible=0.0
+        )

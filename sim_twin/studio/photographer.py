@@ -1,0 +1,105 @@
+"""The twin as a photographer: boards to calibrate by, a guided sample, and pictures whose truth is known."""
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from config.resolved import Resolved
+from robot.errors import RobotConfigError
+from robot.frames import CameraSpec, Frame
+from robot.kinematics import Kinematics
+from robot.photographs import BoardPhotograph, NamedRegion, Photograph, PrintedBoard
+from sim_twin.plant import TwinPlant
+from sim_twin.render import NoGLError, light_lamps
+from sim_twin.rendered_camera import Optics, RenderedCamera
+from sim_twin.studio.boards import photograph_boards
+from sim_twin.studio.conditions import Conditions, Lighting, drawn_conditions
+from sim_twin.studio.naming import named_regions
+from sim_twin.studio.staging import stage, stage_sample
+from sim_twin.studio.viewing import EYE_M, LENS, TARGET_M, looking, nudged
+
+__all__ = ["SAMPLE_SEED", "TwinPhotographer", "open_studio"]
+
+SAMPLE_SEED = 900_001
+SHADOW_PX = 2048
+SPEC = CameraSpec(name="front", serial="twin", width_px=LENS.width_px, height_px=LENS.height_px, rate_hz=30.0)
+PERIOD_NS = 40_000_000
+
+
+def open_studio(resolved: Resolved, *, sharpness: float = 2.0) -> "TwinPhotographer":
+    """Return a photographer of a scenario's table.
+
+    Raises:
+        RobotConfigError: nothing here can draw; the message says what to do.
+    """
+    try:
+        return TwinPhotographer(resolved, sharpness=sharpness)
+    except NoGLError as error:
+        raise RobotConfigError(str(error)) from error
+
+
+class TwinPhotographer:
+    """One twin, one camera; every picture is drawn from a seed of its own."""
+
+    def __init__(self, resolved: Resolved, *, sharpness: float) -> None:
+        plant = TwinPlant(arm=resolved.arm, scenario=resolved.scenario, rig=resolved.rig)
+        self._world, self._truth = plant.world, plant.truth
+        self._kinematics, self._sharpness = Kinematics(resolved.arm), sharpness
+        model = self._world.model
+        model.vis.quality.shadowsize = min(model.vis.quality.shadowsize, SHADOW_PX)
+        self._lighting, self._T_bc = Lighting(model), looking(EYE_M, TARGET_M)
+        self._camera = RenderedCamera(
+            model=model, data=self._world.data, spec=SPEC, lens=LENS, T_bc=self._T_bc,
+            optics=Optics(sharpness=sharpness), rng=np.random.default_rng(0),
+        )  # fmt: skip
+        self._camera.connect()
+        self._now_ns = 0
+
+    def close(self) -> None:
+        """Give up what draws."""
+        self._camera.close()
+
+    def boards(self, board: PrintedBoard) -> Iterator[BoardPhotograph]:
+        """Give pictures of a printed board: for the lens, then lying on the table and touched."""
+        return photograph_boards(board, SPEC, self._T_bc)
+
+    def sample(self) -> Sequence[tuple[Photograph, tuple[NamedRegion, ...]]]:
+        """Give two pictures, lamps off and on, and what a person names in them."""
+        taken = []
+        for is_lit in (False, True):
+            rng = np.random.default_rng([SAMPLE_SEED, int(is_lit)])
+            stage_sample(self._world, self._kinematics, SAMPLE_SEED, is_lit=is_lit)
+            photograph = self._taken("clean", rng)
+            regions = named_regions(self._world.scenario, photograph.objects, self._T_bc, is_lit=is_lit)
+            taken.append((photograph, regions))
+        return taken
+
+    def photographs(self, seeds: Sequence[int], level: str) -> Iterator[Photograph]:
+        """Give one picture a seed: the same seed is the same table under any level."""
+        for seed in seeds:
+            stage(self._world, self._kinematics, np.random.default_rng([seed, 0]))
+            yield self._taken(level, np.random.default_rng([seed, 1]))
+
+    def _taken(self, level: str, rng: np.random.Generator) -> Photograph:
+        world = self._world
+        conditions = drawn_conditions(level, world.model.nlight, self._sharpness, rng)
+        frame = self._exposed(conditions, rng)
+        scenario, out = world.scenario, world.digital_out
+        assert self._truth is not None
+        q_rad = world.data.qpos[:6].tolist()
+        return Photograph(
+            frame=frame, level=level, objects=self._truth.read().objects,
+            lamps_on=tuple(b.name for b in scenario.buttons if out >> b.lamp_output & 1),
+            lids_open=tuple(b.name for b in scenario.boxes if b.lid is not None and out >> b.lid.output & 1),
+            q_rad=(q_rad[0], q_rad[1], q_rad[2], q_rad[3], q_rad[4], q_rad[5]), opening_m=world.arm.tool.stroke_m,
+        )  # fmt: skip
+
+    def _exposed(self, conditions: Conditions, rng: np.random.Generator) -> Frame:
+        light_lamps(self._world)
+        self._lighting.apply(conditions)
+        T_bc = nudged(self._T_bc, conditions.turn_rad, conditions.shift_m)
+        self._camera.adjust(optics=conditions.optics, T_bc=T_bc, rng=rng)
+        frame = self._camera.read(self._now_ns)
+        self._now_ns += PERIOD_NS
+        assert frame is not None
+        return frame
