@@ -2,6 +2,7 @@
 
 import csv
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -15,6 +16,7 @@ from config.sources import shipped_names
 
 ROOT = Path(__file__).parents[1]
 ROOMS = ("config", "learning", "perception", "robot", "sim_twin")
+OF_TESTS = re.compile(r"(?:^|[/_])tests?[/_.]")
 FOLDERS = ("arms", "cells", "learning", "limits", "rigs", "rules", "scenarios")
 
 
@@ -66,7 +68,7 @@ def test_the_wheel_holds_the_rooms_their_data_and_the_licence_and_nothing_else(w
         names = archive.namelist()
     tops = {name.split("/")[0] for name in names}
     assert {top for top in tops if not top.endswith(".dist-info")} == set(ROOMS)
-    assert not [name for name in names if "test" in name.lower() or name.endswith((".pyc", ".pyi", ".toml"))]
+    assert not [name for name in names if OF_TESTS.search(name.lower()) or name.endswith((".pyc", ".pyi", ".toml"))]
     assert {name for name in names if name.endswith(".yaml")} == {
         f"config/{folder}/{name}.yaml" for folder in FOLDERS for name in shipped_names(folder)
     }

@@ -1,6 +1,5 @@
 """`autotelic bus`: look at a running rig's bus. Writes nothing. The edge."""
 
-import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from queue import Empty, SimpleQueue
@@ -163,7 +162,7 @@ def _until_interrupted() -> Iterator[None]:
     try:
         yield
     except KeyboardInterrupt:
-        sys.stderr.write("\n")
+        typer.echo(err=True)
 
 
 def _row(name: str) -> Topic[Any]:

@@ -16,6 +16,8 @@ from sim_twin.checking.tally import Breach, LimitRow
 __all__ = ["CheckReport", "MutationReport", "as_json", "draw", "shown", "shown_mutations"]
 
 N_DRAWN = 4
+LIMIT_WIDTH = 20
+"""Of the column that names limits: whatever the terminal's width, one reads which it is."""
 
 
 class CheckReport(BenchReport, frozen=True, kw_only=True):
@@ -62,10 +64,11 @@ def shown_mutations(report: MutationReport) -> tuple[RenderableType, ...]:
 def shown(report: CheckReport) -> tuple[RenderableType, ...]:
     """Return a table of one row a limit, the worst first, and the sums."""
     table = Table(title=f"teleop check: rig {report.rig}, profile {report.profile}, seed {report.seed}")
-    for name, justify in (("limit", "left"), ("worst margin", "right"), ("value", "right"), ("violations", "right")):
-        table.add_column(name, justify=justify)  # pyright: ignore[reportArgumentType]
+    table.add_column("limit", overflow="fold", min_width=LIMIT_WIDTH)
+    for name in ("worst margin", "value", "violations"):
+        table.add_column(name, justify="right", overflow="fold")
     for name in ("stream", "family", "plant", "where"):
-        table.add_column(name)
+        table.add_column(name, overflow="fold")
     for row in report.limits:
         style = "red" if row.violations else None
         where = f"{row.at_s:.2f} s {row.detail}".strip()

@@ -30,7 +30,7 @@ class Way:
 
     def gap(self, q_rad):
         self.asked.append(q_rad)
-        x = (q_rad[0] - START[0] - STEP) / (END[0] - HERE[0])
+        x = place_of(q_rad)
         if x < -1e-9:
             return self._before
         return self._here if x < 1e-9 else self._end if x > 1.0 - 1e-9 else self._between(x)
@@ -41,6 +41,11 @@ class Way:
 
     def put(self, blocks):
         self.blocks.append(blocks)
+
+
+def place_of(q_rad):
+    """Return where on the way joints are: 0 at the command, 1 where its stop ends."""
+    return (q_rad[0] - HERE[0]) / (END[0] - HERE[0])
 
 
 def checked(way, limits=OPEN):
@@ -79,12 +84,16 @@ def test_a_refusal_names_who_is_nearest_where_it_is_too_near(here, end, named):
     assert way.named == [(pytest.approx(named), pytest.approx(-0.02 + FINE_M))]
 
 
-@pytest.mark.parametrize(("share", "n_looks"), [(0.8, 2), (0.501, 2), (0.499, 3)])
-def test_a_way_is_looked_at_between_only_where_its_ends_leave_room_for_something(share, n_looks):
-    """Two gaps of half the way's length just bound all between; one halving settles what is a little less."""
-    way = Way(1.0, share * LONG_M, share * LONG_M, lambda x: 0.3 * LONG_M)
+@pytest.mark.parametrize("share", [0.02, 0.3, 0.499, 0.501, 0.8, 1.1])
+def test_a_way_that_passes_was_looked_at_until_its_gaps_bound_all_of_it(share):
+    way = Way(1.0, share * LONG_M, share * LONG_M, lambda x: 0.6 * share * LONG_M)
     assert checked(way)[1] is None
-    assert len(way.asked) == n_looks
+    free = sorted((place_of(q) - way.gap(q) / LONG_M, place_of(q) + way.gap(q) / LONG_M) for q in tuple(way.asked))
+    reached = 0.0
+    for low, high in free:
+        assert low <= reached + FINE_M / LONG_M
+        reached = max(reached, high)
+    assert reached >= 1.0
 
 
 @pytest.mark.parametrize(("dip", "is_refused"), [(0.69, False), (0.75, True)])
