@@ -52,6 +52,7 @@ def controller(
     if context.invoked_subcommand is not None:
         return
     from config.errors import ConfigError
+    from robot.errors import RobotError
     from robot.realtime import take_priority
     from sim_twin.controller.planes import parse_plane
     from sim_twin.controller.safety_terminals import parse_safety_input
@@ -78,7 +79,7 @@ def controller(
         with server:
             take_priority(PRIORITY)
             server.run(when_ready=lambda: typer.echo(f"virtual UR5e {version} ready on {host}"))
-    except (OSError, ValueError, ConfigError) as error:
+    except (OSError, ValueError, ConfigError, RobotError) as error:
         typer.echo(f"error: {' '.join(str(error).split())}", err=True)
         raise typer.Exit(2) from None
     except KeyboardInterrupt:

@@ -12,6 +12,7 @@ import msgspec
 
 from config.loader import load_cell
 from config.wiring import check_cell_fits
+from robot.errors import RobotError
 from sim_twin.controller.bus_port import BusPort
 from sim_twin.controller.compiling import ThreadCompiler
 from sim_twin.controller.control_port import CONTROL, ControlPort
@@ -162,7 +163,8 @@ class ControllerServer:
         """Open the ports.
 
         Raises:
-            OSError: a port is taken, or the bus's endpoint is.
+            OSError: a port is taken.
+            RobotError: the bus's endpoint is taken, is none, or is not one that this may listen at.
         """
         try:
             self.wires.open(self.setup.host)
@@ -172,7 +174,7 @@ class ControllerServer:
                 self._trace = TraceWriter(self.setup.trace)
             if self.setup.bus:
                 self._bus = BusPort(self.robot, self.setup.bus, keys=self.setup.keys or None)
-        except OSError:
+        except (OSError, RobotError):
             self.close()
             raise
         if self.setup.script:

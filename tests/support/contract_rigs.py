@@ -95,7 +95,13 @@ class WirePlant:
         self._plant = build_plant(rig=resolved.rig, arm=resolved.arm, scenario=resolved.scenario)
         self.arm, self.cameras = self._plant.arm, self._plant.cameras
         self.truth = RemoteTruth(bus)
-        self.resetter = RemoteResetter(bus, loop=self.arm, truth=self.truth)
+        self.resetter = RemoteResetter(bus, loop=self, truth=self.truth)
+
+    def stop(self):
+        self.arm.stop()
+
+    def await_rest(self):
+        """Return: this arm waits for that in its stop."""
 
     @property
     def identity(self):

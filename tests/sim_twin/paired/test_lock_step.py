@@ -74,4 +74,4 @@ def test_corners_at_full_speed_are_the_lock_step_stations_whatever_a_decision_ta
     assert "leash" in limiters, "an errand that meets no leash proves nothing of it"
     assert found.frechet_m < FRECHET_M
     assert found.length_m > 0.3
-    assert 0.0 <= found.offset_s < 0.03
+    assert 0.0 <= found.offset_s < 0.04  # an intent sets out 12 ms after it came, where ticks are short
