@@ -147,6 +147,7 @@ class RobotiqGripper:
             while not self.is_active:
                 self._see_in_time(see, deadline_ns)
         except BaseException:
+            self._is_query_out = False  # its answer may have been lost with whatever broke in: it is asked again
             self.halt()
             raise
         self._is_activating = False

@@ -129,6 +129,30 @@ def test_an_activation_that_is_broken_off_is_taken_back(bench):
     bench.turn(lambda: bench.fingers.registers.act == 0)
 
 
+def test_an_answer_that_is_lost_where_an_activation_is_broken_off_is_asked_for_again(bench):
+    strokes = Strokes(bench, 10**9)
+
+    def see():
+        strokes()
+        if strokes.seen[-1] == 1 and bench.gripper._is_query_out:
+            bench.reactor.poll()
+            assert taken_away(bench.gripper)
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        bench.gripper.activate(see)
+    before = bench.gripper.n_answers
+    bench.turn(lambda: bench.gripper.n_answers > before)
+
+
+def taken_away(gripper):
+    """Return what had come and now never will."""
+    try:
+        return gripper._socket.recv(4096)
+    except BlockingIOError:
+        return b""
+
+
 @pytest.mark.parametrize(
     ("pos", "obj", "opening_m", "gto"),
     [
