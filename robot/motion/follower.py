@@ -22,6 +22,7 @@ from robot.motion.holding import (
     tips_too_fast,
     too_fast,
 )
+from robot.motion.lean import Lean
 from robot.motion.limiter import AxisLimits, Limiter
 from robot.motion.pacing import braked, part_way, window
 
@@ -77,6 +78,7 @@ class Follower:
         self._fence_names = {fence.name for fence in envelope.fences}
         self._is_swift = tick_s < SWIFT_TICK_S
         self._kinematics = Kinematics(arm, is_swift=True)
+        self._lean = Lean(tick_s=tick_s)
         self._home_yaw_rad = arm.tool_yaw_rad
         self._tick_s = tick_s
         self._tool = Limiter(
@@ -112,6 +114,7 @@ class Follower:
         self._is_upright = self._is_solved = False
         self._to_come: list[float] | None = None
         self._joints.seed(list(q_rad))
+        self._lean.begin(q_rad, None)
         self._take_up_tool()
 
     def tcp(self, q_rad: Vec6) -> Vec3:
@@ -220,13 +223,15 @@ class Follower:
             self._take_target(self._to_come)
         before = self._tool.at
         now = self._slide(before, self._tool.step())
-        if now == before and self._is_solved:
+        lean = self._lean
+        if now == before and self._is_solved and lean.is_over:
             return self.q_rad  # at rest: solving again would stir the last digits
         self._is_solved = True
         x, y, z, yaw = now
         ahead = _between(self.q_before_rad, self.q_rad, 2.0)
         try:
-            return self._kinematics.solve((x, y, z), ahead, yaw_rad=yaw)
+            q = self._kinematics.solve((x, y, z), ahead, yaw_rad=yaw)
+            return q if lean.is_over else lean.step(q)
         except UnreachableError:
             self._take_up_joints()
             self.brake()
@@ -330,6 +335,7 @@ class Follower:
         tool.go_on(*([*place, yaw] for place, yaw in zip(places, yaws, strict=True)))
         tool.aim(target)
         self._is_solved = False
+        self._take_up_lean(q)
 
     def _take_up_tool(self) -> None:
         """Go on by the tool's coordinates, if it points down and the joints are at rest."""
@@ -346,6 +352,18 @@ class Follower:
         self.target_m, self.yaw_rad = self._kinematics.tcp(self.q_rad), yaw
         self._tool.seed([*self.target_m, yaw])
         self._is_solved = False
+        self._take_up_lean(self.q_rad)
+
+    def _take_up_lean(self, q: Vec6) -> None:
+        """Go on from joints that are other than an upright tool's there: bent by a push, or held back."""
+        if not self._is_swift:
+            return
+        x, y, z, yaw = self._tool.at
+        try:
+            upright = self._kinematics.solve((x, y, z), q, yaw_rad=yaw)
+        except UnreachableError:
+            upright = None
+        self._lean.begin(q, upright)
 
     def _take_up_joints(self) -> None:
         """Go on by the joints, from where they are and as fast as they go."""

@@ -16,6 +16,7 @@ pytestmark = pytest.mark.realtime
 
 LOCK_STEP_TICK_S, WIRE_TICK_S = 0.01, 0.002
 SEEDS = (1, 3)
+PRESS_SEEDS = (1, 3)
 FRECHET_M = 1.5e-3
 
 
@@ -42,18 +43,27 @@ class Driven:
         return Track(t_s=rows[:, 0] - rows[0, 0], p_m=np.array([chain.tcp(tuple(q)) for q in rows[:, 1:].tolist()]))
 
 
-@pytest.fixture(scope="module")
-def errands():
-    """Errands and the tracks that a station in lock-step left."""
+def driven_in_lock_step(kind, seeds):
+    """Return errands and the tracks that a station in lock-step left, by seed."""
     twin = Driven(LOCK_STEP_TICK_S)
     station = OperatedStation(build_station(twin.resolved, plant=twin.plant), build_operator(twin.resolved.rig))
     station.connect()
     driven = {}
-    for seed in SEEDS:
-        errand = drive_errand(station, kind=Kind.MOVES, seed=seed, epoch=0)
+    for seed in seeds:
+        errand = drive_errand(station, kind=kind, seed=seed, epoch=0)
         driven[seed] = errand, twin.track(len(errand.intents))
     station.close()
     return driven
+
+
+@pytest.fixture(scope="module")
+def errands():
+    return driven_in_lock_step(Kind.MOVES, SEEDS)
+
+
+@pytest.fixture(scope="module")
+def presses():
+    return driven_in_lock_step(Kind.PRESS, PRESS_SEEDS)
 
 
 @pytest.mark.parametrize("most_decided", [0, 5])
@@ -75,3 +85,21 @@ def test_corners_at_full_speed_are_the_lock_step_stations_whatever_a_decision_ta
     assert found.frechet_m < FRECHET_M
     assert found.length_m > 0.3
     assert 0.0 <= found.offset_s < 0.04  # an intent sets out 12 ms after it came, where ticks are short
+
+
+@pytest.mark.parametrize("seed", PRESS_SEEDS)
+def test_a_tool_that_pressed_a_button_rises_as_the_lock_step_stations_does(presses, seed):
+    """The push bends the joints: taken back all at once, tick by tick, that held the arm down for good."""
+    errand, expected = presses[seed]
+    wire = Driven(WIRE_TICK_S)
+    served = HandServed(wire.resolved, wire.plant)
+    wire.plant.resetter.reset(seed=errand.seed, epoch=errand.epoch, digital_out=served.loop.begin_epoch(errand.epoch))
+    served.seed()
+    n_ticks = round(wire.resolved.arm.motion.step_s / WIRE_TICK_S)
+    for intent in errand.intents:
+        served.stride(intent, n_ticks=n_ticks, n_decided=0)
+    found = wire.track(len(errand.intents))
+    heights_m = found.p_m[:, 2]
+    assert heights_m.min() < 0.06
+    assert heights_m[-1] > 0.2
+    assert compare(expected, found).frechet_m < FRECHET_M
