@@ -2,6 +2,8 @@
 
 from time import perf_counter
 
+from rich.console import Console
+
 from robot.bench import BenchReport, BenchResult, bench_report
 from sim_twin.broken.course import Course
 from sim_twin.broken.outcome import Outcome
@@ -21,8 +23,19 @@ def bench_faults(*, full: bool) -> BenchReport:
     """
     begun = perf_counter()
     with Course(HOST) as course:
-        results = [_row(course, trial) for trial in TRIALS if full or trial.is_brief]
+        results = _rows(course, [trial for trial in TRIALS if full or trial.is_brief])
     return bench_report("faults", results, seconds=perf_counter() - begun)
+
+
+def _rows(course: Course, trials: list[Trial]) -> list[BenchResult]:
+    """Return each fault's row; tell meanwhile, on the terminal's second channel, how far it has come."""
+    console, results = Console(stderr=True, highlight=False), list[BenchResult]()
+    for k, trial in enumerate(trials, start=1):
+        console.print(f"{k} of {len(trials)}: {trial.name}")
+        results.append(_row(course, trial))
+        if not results[-1].ok:
+            console.print(f"  {results[-1].details}", markup=False)
+    return results
 
 
 def _row(course: Course, trial: Trial) -> BenchResult:

@@ -63,10 +63,15 @@ class Course:
             DisturbedError: it did so each time, and this machine was busy elsewhere.
             CutShortError: it did so each time on a machine that had time to spare: no disturbance explains it.
         """
-        return in_peace(trial.name, lambda: self._moved_again(trial))
+        told: list[str] = []
+        outcome = in_peace(trial.name, lambda: self._moved_again(trial), told=told)
+        return msgspec.structs.replace(outcome, begun_anew=tuple(told))
 
     def _moved_again(self, trial: Trial) -> Outcome:
-        outcome = self._try(trial)
+        try:
+            outcome = self._try(trial)
+        except RobotError as error:
+            raise DisturbedError(f"the arm was not taken: {error}") from error
         if outcome.again is not None:
             raise DisturbedError(f"did not move again: {outcome.again.what}")
         return outcome

@@ -35,6 +35,8 @@ class Outcome(msgspec.Struct, frozen=True, kw_only=True):
     """Farthest that a joint moved while the arm was taken, before the first new command."""
     again: Raised | None
     """What came up when it was moved again; None where it moved."""
+    begun_anew: tuple[str, ...] = ()
+    """What disturbed the tries before this one."""
 
     def failures(self) -> tuple[str, ...]:
         """Return what is not as asked, in words."""
@@ -72,6 +74,8 @@ class Outcome(msgspec.Struct, frozen=True, kw_only=True):
             found["barred"] = self.barred
         found["rearm_mrad"] = f"{1e3 * self.rearm_rad:.2f}"
         found["again"] = "moves" if self.again is None else self.again.what
+        if self.begun_anew:
+            found["begun_anew"] = "; ".join(self.begun_anew)
         return found
 
     def _wrong_stop(self) -> tuple[str, ...]:

@@ -20,14 +20,19 @@ class CutShortError(RuntimeError):
     """Something came up that nothing was made to go wrong for, and this machine was not busy."""
 
 
-def in_peace(name: str, attempt: Callable[[], T]) -> T:
+def in_peace(name: str, attempt: Callable[[], T], *, told: list[str]) -> T:
     """Return what an attempt comes to; make it anew where it was disturbed.
+
+    Args:
+        name: what is tried.
+        attempt: one try of it.
+        told: gets what disturbed each try that was begun anew.
 
     Raises:
         DisturbedError: it was each time, and this machine was busy elsewhere.
         CutShortError: it was each time on a machine that had time to spare: no disturbance explains it.
     """
-    n_spared, told = 0, []
+    n_spared = 0
     while len(told) < N_TRIES and 2 * n_spared <= N_TRIES:
         spare = Spare().begin()
         try:

@@ -77,7 +77,9 @@ class ProcessCourse:
             DisturbedError: it did so each time, and this machine was busy elsewhere.
             CutShortError: it did so each time on a machine that had time to spare.
         """
-        return in_peace(case.name, lambda: self._try(case))
+        told: list[str] = []
+        outcome = in_peace(case.name, lambda: self._try(case), told=told)
+        return msgspec.structs.replace(outcome, begun_anew=tuple(told))
 
     def _try(self, case: Case) -> Outcome:
         try:

@@ -27,6 +27,8 @@ class Outcome(msgspec.Struct, frozen=True, kw_only=True):
     reason: str
     n_refused: int
     """Intents refused since. After that a person armed it, and it moved."""
+    begun_anew: tuple[str, ...] = ()
+    """What disturbed the tries before this one."""
 
     @property
     def rest_goal_s(self) -> float:
@@ -54,8 +56,8 @@ class Outcome(msgspec.Struct, frozen=True, kw_only=True):
 
     def details(self) -> dict[str, str]:
         """Return the figures as a table shows them."""
-        ramp = self.ramp
-        return {
+        ramp, anew = self.ramp, "; ".join(self.begun_anew)
+        found = {
             "rest_ms": f"{1e3 * ramp.rest_s:.0f} of {1e3 * self.rest_goal_s:.0f}",
             "way_mm": f"{1e3 * ramp.way_m:.1f} of {1e3 * ramp.predicted_m:.1f}",
             "speed_m_s": f"{ramp.speed_m_s:.3f}",
@@ -65,3 +67,4 @@ class Outcome(msgspec.Struct, frozen=True, kw_only=True):
             "state": f"{self.mode}: {self.reason}".rstrip(": "),
             "refused": str(self.n_refused),
         }
+        return found | ({"begun_anew": anew} if anew else {})
