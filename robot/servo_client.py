@@ -11,6 +11,7 @@ import msgspec
 
 from config.resolved import Resolved
 from robot.errors import NotEngagedError, RobotError, StaleStateError, WireError
+from robot.hal.leftover import Leftover
 from robot.messages import ArmState, GripCommand, Intent, PlantIdentity, Vec3
 from robot.servo_failures import cut_short, error_of
 from robot.servo_messages import (
@@ -44,6 +45,10 @@ STRIDE_SLACK_S = 5.0
 """How much later than it should a time step may end while the process still ticks."""
 CLOSE_S = 5.0
 """How long a process may take to stop its arm, where it still can, and to end."""
+WHILE_TAKING = (
+    "it was lost while it took command, when no watchdog may have been armed yet: a program that it left on the arm is "
+    "ended as soon as the controller can be reached, for 2 s; after that look at the pendant"
+)
 COAST_S = 0.5
 """Longer than the controller's watchdog waits and the arm then takes to rest."""
 
@@ -70,6 +75,8 @@ class ServoClient:
         self._when_closed = when_closed
         self._resolved_json = msgspec.json.encode(resolved)
         self._tick_s = resolved.rig.tick_s
+        address = resolved.rig.address
+        self._leftover = None if address is None else Leftover(address)
         self._process: BaseProcess | None = None
         self._connection: Connection | None = None
         self._watch: ServoWatch | None = None
@@ -131,6 +138,8 @@ class ServoClient:
         if not self._is_gone:
             return
         self.await_rest()
+        if self._leftover is not None:
+            self._leftover.wait()
         context = get_context("spawn")
         ours, theirs = context.Pipe()
         pulse = context.RawArray("q", 1)
@@ -151,7 +160,13 @@ class ServoClient:
         """Take command of the arm; a process that has ended is started anew, and what was lost before is forgotten."""
         self.connect()
         self._told = self._why_lost = None
-        self._ask(Engage(), Done, ENGAGE_S)
+        try:
+            self._ask(Engage(), Done, ENGAGE_S)
+        except RobotError as error:
+            if not self._is_gone or self._leftover is None:
+                raise
+            self._leftover.begin()
+            raise type(error)(f"{error}; {WHILE_TAKING}") from error
         self._is_in_command = True
 
     def stop(self) -> None:
@@ -238,6 +253,8 @@ class ServoClient:
         try:
             self._end()
         finally:
+            if self._leftover is not None:
+                self._leftover.wait()
             when_closed, self._when_closed = self._when_closed, None
             if when_closed is not None:
                 when_closed()

@@ -20,6 +20,8 @@ __all__ = ["JOG_RAD", "TOLD_S", "TRIALS", "Moment", "Stage", "Trial"]
 JOG_RAD = 0.3
 TOLD_S = 0.1
 """How soon whatever stops the arm must be told."""
+BEGINS_S = 5.0
+"""A program begins within so long of the word that takes command."""
 
 
 class Moment(StrEnum):
@@ -92,6 +94,18 @@ def _cut(stage: Stage) -> float:
     return stage.fault("drop")
 
 
+def _cut_as_it_begins(stage: Stage) -> float:
+    """Cut everything as the client's program begins to run: nobody has armed its watchdog yet."""
+    end_s = monotonic() + BEGINS_S
+    was_playing = True
+    while monotonic() < end_s:
+        is_playing = ask_fault(stage.host, "truth")["runtime"] == "PLAYING"
+        if is_playing and not was_playing:
+            break
+        was_playing = is_playing
+    return stage.fault("drop")
+
+
 def _localise(stage: Stage) -> float:
     """Take remote control away, so that nobody but a person can end a program that the safeguard then pauses."""
     stage.fault("remote", on=False)
@@ -146,6 +160,7 @@ TRIALS: tuple[Trial, ...] = (
         hold_s=3.0, bars=True,
     ),
     Trial(name="cut_during_engage", begin=_by("drop"), during=Moment.ENGAGE, hold_s=1.0),
+    Trial(name="cut_as_program_begins", begin=_cut_as_it_begins, during=Moment.ENGAGE, hold_s=1.0, is_brief=True),
     Trial(name="cut_between_engage_and_seed", begin=_by("drop"), during=Moment.SEED, hold_s=1.0),
     Trial(name="rtde_dropped", begin=_by("drop", port=30004)),
     Trial(name="link_late_200ms", begin=_by("delay", ms=200), end=_by("delay", ms=0), begins_s=0.26),

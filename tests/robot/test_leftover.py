@@ -1,0 +1,68 @@
+"""A program whose process was lost before its watchdog was armed is ended; somebody's later one is not."""
+
+import socket
+from time import monotonic, sleep
+
+import pytest
+
+from robot.hal.leftover import Leftover
+from sim_twin.controller.process import ControllerProcess, ask_fault
+from sim_twin.controller.server import Setup
+from tests.support.loopback import own_address
+
+pytestmark = pytest.mark.realtime
+
+SCRIPT = b"def waits():\n  while True:\n    sync()\n  end\nend\n"
+SECONDARY = 30002
+
+
+@pytest.fixture(scope="module")
+def host():
+    with ControllerProcess(Setup(host=own_address())) as controller:
+        yield controller.host
+
+
+def runtime(host):
+    return ask_fault(host, "truth")["runtime"]
+
+
+def play(host):
+    with socket.create_connection((host, SECONDARY)) as link:
+        link.sendall(SCRIPT)
+        end_s = monotonic() + 5.0
+        while runtime(host) != "PLAYING" and monotonic() < end_s:
+            sleep(0.01)
+    assert runtime(host) == "PLAYING"
+
+
+def test_what_runs_when_the_process_was_lost_is_ended(host):
+    play(host)
+    leftover = Leftover(host)
+    leftover.begin()
+    assert leftover.wait()
+    assert runtime(host) == "STOPPED"
+
+
+def test_what_begins_a_moment_after_the_loss_is_ended_too(host):
+    leftover = Leftover(host)
+    leftover.begin()
+    play(host)
+    assert leftover.wait()
+    assert runtime(host) == "STOPPED"
+
+
+def test_what_begins_once_it_is_over_is_somebodys_and_runs_on(host):
+    leftover = Leftover(host)
+    leftover.begin()
+    assert leftover.wait()
+    play(host)
+    sleep(0.3)
+    assert runtime(host) == "PLAYING"
+
+
+def test_where_nobody_answers_it_gives_up_in_time():
+    leftover = Leftover(own_address(), patience_s=0.3)
+    begun_s = monotonic()
+    leftover.begin()
+    assert not leftover.wait()
+    assert monotonic() - begun_s < 5.0
