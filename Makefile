@@ -27,13 +27,14 @@ check: setup
 	$(BIN)/pyright
 	$(BIN)/lint-imports
 
-# What keeps to a wall's clock runs alone; the rest shares the processors.
+# What keeps to a wall's clock runs alone; the rest shares the processors. By `python -m`, for every process that a test
+# spawns would run the script `pytest` again, and import it.
 test: check
-	$(BIN)/pytest -m "not slow and not realtime" --numprocesses auto --dist loadfile --no-loadscope-reorder
-	$(BIN)/pytest -m "not slow and realtime"
+	$(BIN)/python -m pytest -m "not slow and not realtime" --numprocesses auto --dist loadfile --no-loadscope-reorder
+	$(BIN)/python -m pytest -m "not slow and realtime"
 
 test-slow: setup
-	$(BIN)/pytest -m slow
+	$(BIN)/python -m pytest -m slow
 
 bench: setup
 	@failed=0; for name in $(BENCHES); do $(BIN)/autotelic bench $$name || failed=1; done; exit $$failed

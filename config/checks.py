@@ -36,9 +36,9 @@ class Checker:
     def known(self, name: str, known: Iterable[str], where: str, what: str) -> None:
         """Raise unless the name is one of the known ones."""
         names = list(known)
-        self.need(
-            name in names, where, f"{what}: {', '.join(names) or 'there is none'}", f"{name}{nearest(name, names)}"
-        )
+        if name not in names:
+            expected = f"{what}: {', '.join(names) or 'there is none'}"
+            raise ConfigError(self._file, where, expected, f"{name}{nearest(name, names)}")
 
     def unique(self, values: Iterable[tuple[str, object]], what: str) -> None:
         """Raise where a value comes a second time; values come with their places."""

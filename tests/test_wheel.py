@@ -17,6 +17,7 @@ from config.sources import shipped_names
 ROOT = Path(__file__).parents[1]
 ROOMS = ("config", "learning", "perception", "robot", "sim_twin")
 OF_TESTS = re.compile(r"(?:^|[/_])tests?[/_.]")
+QUICK = "experiment: {trials: 2, steps: 30, evaluate_every: 2, test_epochs: 1, checkpoint_every: 1}\n"
 FOLDERS = ("arms", "cells", "learning", "limits", "rigs", "rules", "scenarios")
 
 
@@ -56,8 +57,8 @@ def call(wheel, tmp_path_factory):
     assert installed.returncode == 0, installed.stderr
     empty = tmp_path_factory.mktemp("empty")
 
-    def command(*arguments, program=site / "bin" / "autotelic"):
-        return run(program, *arguments, cwd=empty, PYTHONPATH=str(site), OMP_NUM_THREADS="1")
+    def command(*arguments, program=site / "bin" / "autotelic", **environment):
+        return run(program, *arguments, cwd=empty, PYTHONPATH=str(site), OMP_NUM_THREADS="1", **environment)
 
     command.site, command.folder = site, empty
     return command
@@ -91,14 +92,18 @@ def test_the_shipped_configs_are_found_and_right(call):
     assert result.stdout.count("ok: ") == sum(len(shipped_names(folder)) for folder in FOLDERS)
 
 
-def test_a_few_epochs_of_learning_leave_a_run_folder(call):
-    shipped = (call.site / "config" / "learning" / "default.yaml").read_text(encoding="utf-8")
-    assert "test_epochs: 10" in shipped
-    (call.folder / "quick.yaml").write_text(shipped.replace("test_epochs: 10", "test_epochs: 1"), encoding="utf-8")
+@pytest.mark.parametrize("is_compiled", [False, pytest.param(True, marks=pytest.mark.slow)])
+def test_a_few_epochs_of_learning_leave_a_run_folder(call, is_compiled):
+    """Compiled it takes 20 s longer: what was just installed has no machine code yet."""
+    shipped = (call.site / "config" / "learning" / "default.yaml").read_text(encoding="utf-8").splitlines(keepends=True)
+    kept = [line for line in shipped if not line.startswith("experiment:")]
+    assert len(kept) == len(shipped) - 1
+    (call.folder / "quick.yaml").write_text("".join(kept) + QUICK, encoding="utf-8")
     names = ("--scenario", "paper", "--rig", "twin", "--preset", "quick.yaml")
-    result = call("learn", *names, "--seed", "3", "--epochs", "2", "--out", "out")
+    out = call.folder / f"out_{is_compiled}"
+    jit = {} if is_compiled else {"NUMBA_DISABLE_JIT": "1"}
+    result = call("learn", *names, "--seed", "3", "--epochs", "2", "--out", out.name, **jit)
     assert result.returncode == 0, result.stdout + result.stderr
-    out = call.folder / "out"
     assert load_resolved(out / "config.yaml").scenario.name == "paper"
     with (out / "trials.csv").open(encoding="utf-8", newline="") as stream:
         assert {row["epoch"] for row in csv.DictReader(stream)} == {"0", "1"}

@@ -9,6 +9,7 @@ import itertools
 import math
 from collections.abc import Iterator
 from enum import StrEnum
+from functools import lru_cache
 
 import msgspec
 import mujoco
@@ -31,6 +32,8 @@ NEVER_NEARER_M = 0.002
 """Parts two links apart that no joint angles bring nearer than this cannot touch, however thick their capsules."""
 PALM_HALF_M = (0.032, 0.06)
 """Half extents of the palm across and along the jaws, as the arm's description has it."""
+KEPT = 16
+"""Arms at tables whose untouchable parts are remembered."""
 OWN_LINKS_APART = 2
 """Links with fewer joints between them are neighbours and always touch."""
 _BOX, _CAPSULE, _PLANE = mujoco.mjtGeom.mjGEOM_BOX, mujoco.mjtGeom.mjGEOM_CAPSULE, mujoco.mjtGeom.mjGEOM_PLANE
@@ -86,7 +89,8 @@ def collision_model(
         reach_m: distances beyond this are not looked at.
     """
     spec = _spec(arm, table_m, blocks)
-    pairs = [pair for pair in _pairs(arm, blocks) if _can_touch(arm, spec, pair)]
+    apart = _remembered(arm, table_m)
+    pairs = [pair for pair in _pairs(arm, blocks) if pair not in apart]
     for pair in pairs:
         kept = hard.of(pair.near)
         spec.add_pair(geomname1=_shape(pair), geomname2=pair.other, margin=kept, gap=reach_m - kept, condim=1)
@@ -130,18 +134,22 @@ def _parts(arm: ArmConfig) -> list[tuple[str, int]]:
     return [*((f"link_{c.link}_{k}", c.link) for k, c in enumerate(arm.capsules)), (PALM, 6), (FINGERS, 6)]
 
 
-def _can_touch(arm: ArmConfig, spec: mujoco.MjSpec, pair: Pair) -> bool:
-    """Whether two shapes come near at any joint angles at all; asked where two joints at most are between them.
+def _never_touching(arm: ArmConfig, table_m: float) -> frozenset[Pair]:
+    """Return the pairs of the arm with itself and the table that no joint angles bring near: tried once, in 20 ms."""
+    model = _spec(arm, table_m, ()).compile()
+    return frozenset(pair for pair in _pairs(arm, ()) if not _can_touch(arm, model, pair))
 
-    A thing may come to stand anywhere.
-    """
-    if pair.near in (Near.THING, Near.LEAF):
-        return True
+
+_remembered = lru_cache(maxsize=KEPT)(_never_touching)
+"""No decorator: mutants are made of functions without one (docs/mutation.md)."""
+
+
+def _can_touch(arm: ArmConfig, model: mujoco.MjModel, pair: Pair) -> bool:
+    """Whether two shapes come near at any joint angles at all; asked where two joints at most are between them."""
     links = dict(_parts(arm))
     first, last = sorted((links[pair.part], links.get(pair.other, 0)))
     if last - first > OWN_LINKS_APART:
         return True
-    model = spec.compile()
     data = mujoco.MjData(model)
     a, b = model.geom(pair.part).id, model.geom(pair.other).id
     angles = np.linspace(-np.pi, np.pi, ANGLES_TRIED, endpoint=False)

@@ -1,4 +1,6 @@
-"""What the contract suites share: rigs, and a repeat on a stalled machine."""
+"""What the contract suites share: rigs, which of them keep to a wall's clock, and a repeat on a stalled machine."""
+
+from pathlib import Path
 
 import pytest
 from _pytest.runner import runtestprotocol
@@ -22,6 +24,18 @@ def world(request):
 @pytest.fixture
 def resolved(world):
     return world.resolved
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items):
+    """Mark what runs on a wire as keeping to a wall's clock, and there as slow what is marked `slow_on_a_wire`."""
+    for item in items:
+        name = getattr(getattr(item, "callspec", None), "params", {}).get("world")
+        if Path(item.path).parent != Path(__file__).parent or name is None or WORLDS[name].is_lock_step:
+            continue
+        item.add_marker(pytest.mark.realtime)
+        if item.get_closest_marker("slow_on_a_wire"):
+            item.add_marker(pytest.mark.slow)
 
 
 STALL_S, N_ATTEMPTS = 0.03, 3

@@ -18,9 +18,8 @@ from robot.servo import lag_s
 from tests.contract.fits import PLANTS
 from tests.support.contract_rigs import WORLDS
 
-pytestmark = pytest.mark.realtime
-
 LIDS = 0b111000
+MORE_SEEDS = pytest.mark.slow_on_a_wire("drawn from the same region, and each is an engagement of two seconds")
 RATES_RAD_S = np.array([0.3, 0.1, 0.0, 0.0, 0.0, -0.2])
 
 
@@ -333,7 +332,7 @@ def test_a_reset_is_reproducible_by_its_seed_whatever_happened_before(world, pla
     assert is_same(world, snapshot(other), first)
 
 
-@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("seed", [0, 1, *(pytest.param(seed, marks=MORE_SEEDS) for seed in (2, 3, 4))])
 def test_after_a_reset_the_arm_rests_in_the_start_region_with_an_open_hand(plant, driver, resolved, seed):
     driver.opening = 0.0
     driver.run(0.5)

@@ -7,8 +7,6 @@ from pathlib import Path
 
 import pytest
 
-pytestmark = pytest.mark.realtime
-
 ROOT = Path(__file__).parents[2]
 STALLING = """
 from itertools import count

@@ -22,7 +22,10 @@ from robot.messages import (
 from robot.safety import TooManyLatchesError
 from sim_twin.operator import SimulatedOperator
 
-pytestmark = pytest.mark.realtime
+LATCHES_ANEW = pytest.mark.slow_on_a_wire("another word of the same gate, and each takes two seconds to arm again")
+EPISODES = pytest.mark.slow_on_a_wire("the epoch after a latch, and the plant's own resets, say the same of a wire")
+ONE_OF_MANY = pytest.mark.slow_on_a_wire("shaped by the same motion, whatever the plant")
+COUNTS = pytest.mark.slow_on_a_wire("the station counts, whatever its plant, and each latch takes two seconds")
 
 
 @pytest.fixture
@@ -240,6 +243,7 @@ def two(world):
         world.leave(station)
 
 
+@EPISODES
 def test_the_same_seed_is_the_same_episode_and_another_seed_another(world, two):
     (one, _), (other, _) = two
     first = episode(one, seed=3, epoch=0, n=8)
@@ -247,6 +251,7 @@ def test_the_same_seed_is_the_same_episode_and_another_seed_another(world, two):
     assert is_same(world, episode(other, seed=3, epoch=0, n=8), first)
 
 
+@EPISODES
 def test_an_epoch_depends_on_nothing_before_its_reset(world, two):
     (through, _), (straight, _) = two
     for epoch in (0, 1):
@@ -268,6 +273,10 @@ def test_an_epoch_after_a_latch_is_the_epoch_that_would_have_been(world, two):
 
 HOSTILE = [
     (go(angle=math.nan), "not_finite"),
+    (JointTarget(q_rad=(1e8,) * 6), "out_of_reason"),
+    ("up", "malformed"),
+]
+MORE_HOSTILE = [
     (go(distance=1e12), "out_of_reason"),
     (go(distance="far"), "malformed"),
     (None, "malformed"),
@@ -278,13 +287,13 @@ HOSTILE = [
     (Twist(linear_m_s=(1e5, 0.0, 0.0)), "out_of_reason"),
     (JointTarget(q_rad=(math.nan,) * 6), "not_finite"),
     (JointTarget(q_rad=(0.0,) * 5), "malformed"),
-    (JointTarget(q_rad=(1e8,) * 6), "out_of_reason"),
-    ("up", "malformed"),
     (object(), "malformed"),
 ]
 
 
-@pytest.mark.parametrize(("intent", "reason"), HOSTILE)
+@pytest.mark.parametrize(
+    ("intent", "reason"), [*HOSTILE, *(pytest.param(*each, marks=LATCHES_ANEW) for each in MORE_HOSTILE)]
+)
 def test_a_hostile_intent_is_refused_with_a_clear_verdict_and_moves_nothing(standing, intent, reason):
     station, arm, _ = standing
     for _ in range(3):
@@ -309,9 +318,9 @@ def test_a_hostile_intent_is_refused_with_a_clear_verdict_and_moves_nothing(stan
     "intent",
     [
         go(distance=5.0),
-        go(height=9.0),
-        go(height=-9.0),
-        go(angle=500.0),
+        pytest.param(go(height=9.0), marks=ONE_OF_MANY),
+        pytest.param(go(height=-9.0), marks=ONE_OF_MANY),
+        pytest.param(go(angle=500.0), marks=ONE_OF_MANY),
         Twist(linear_m_s=(9.0, -9.0, -9.0)),
         JointTarget(q_rad=(6.0, 6.0, -6.0, 6.0, -6.0, 6.0)),
     ],
@@ -354,6 +363,7 @@ def test_after_a_latch_motion_starts_from_rest_at_the_measured_joints(engaged):
     assert math.dist(result.percept.tcp_position_m, start) < 1e-3
 
 
+@COUNTS
 def test_too_many_latches_fail_the_run(world, resolved):
     few = msgspec.structs.replace(resolved, rig=msgspec.structs.replace(resolved.rig, max_latches=2))
     station, _, operator = world.station(few)

@@ -283,7 +283,7 @@ def test_the_bench_reads_the_run_given_or_the_newest(folder, tmp_path):
 def test_ctrl_c_stops_at_an_epochs_end_and_resuming_gives_the_uninterrupted_run(run, folder):
     options = ["--rig", "fake", "--preset", "fast.yaml", "--workers", "1"]
     command = [sys.executable, "-c", "from robot.cli import main; main()", "learn", *options]
-    long = ["--epochs", "24", "--seed", "0"]
+    long = ["--epochs", "16", "--seed", "0"]
     with subprocess.Popen(
         [*command, *long, "--out", "stopped"], cwd=folder, stderr=subprocess.PIPE, text=True
     ) as process:
@@ -297,7 +297,7 @@ def test_ctrl_c_stops_at_an_epochs_end_and_resuming_gives_the_uninterrupted_run(
     assert "stopping after this epoch" in said
     assert "go on with: autotelic learn --resume --out stopped" in said
     n_done = len(goals.read_bytes().splitlines()) - 1
-    assert 3 <= n_done < 24
+    assert 3 <= n_done < 16
     resumed = autotelic("learn", "--resume", "--out", "stopped")
     assert resumed.exit_code == 0, resumed.output
     whole = learn("unbroken", *long)

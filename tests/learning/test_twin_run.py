@@ -14,6 +14,7 @@ from tests.support.toy_run import FILES, files_of
 
 ROOT = Path(__file__).parents[2]
 QUICK = "experiment: {trials: 2, steps: 30, evaluate_every: 4, test_epochs: 1, checkpoint_every: 2}\n"
+N_EPOCHS = 6
 
 
 def command(preset, out, *arguments):
@@ -43,22 +44,22 @@ def preset(request, tmp_path_factory):
 def whole(preset, tmp_path_factory):
     """An uninterrupted run without workers."""
     out = tmp_path_factory.mktemp("runs") / "whole"
-    return out, learn(preset, out, "--epochs", 8, "--workers", 0)
+    return out, learn(preset, out, "--epochs", N_EPOCHS, "--workers", 0)
 
 
 def test_a_run_on_the_twin_is_whole_and_physics_did_something(whole):
     out, files = whole
     assert set(files) == set(FILES)
-    assert len(read_rows(out / "goals.csv", GoalRow)) == 8
+    assert len(read_rows(out / "goals.csv", GoalRow)) == N_EPOCHS
     trials = read_rows(out / "trials.csv", TrialRow)
     assert {len(row.state) for row in trials} == {len(resolve().scenario.goals)}
     assert any("1" in row.state_after for row in trials)
 
 
-@pytest.mark.parametrize("kills", [(3,), pytest.param((2, 5, 6), marks=pytest.mark.slow)], ids=["once", "thrice"])
+@pytest.mark.parametrize("kills", [(3,), pytest.param((2, 3, 4), marks=pytest.mark.slow)], ids=["once", "thrice"])
 def test_killed_and_resumed_with_a_worker_is_identical(preset, whole, tmp_path, kills):
     out = tmp_path / "killed"
-    arguments = ("--epochs", 8, "--workers", 1)
+    arguments = ("--epochs", N_EPOCHS, "--workers", 1)
     for n_epochs in kills:
         with subprocess.Popen(command(preset, out, *arguments), cwd=ROOT, stderr=subprocess.DEVNULL) as process:
             while _n_epochs(out) < n_epochs and process.poll() is None:

@@ -33,12 +33,19 @@ def stride(client, intent):
     return client.stride(intent, OPEN, n_ticks=N_TICKS)
 
 
-@pytest.fixture
-def client():
+@pytest.fixture(scope="module")
+def lasting():
     made = ServoClient(fake_rig())
-    made.connect()
     yield made
     made.close()
+
+
+@pytest.fixture
+def client(lasting):
+    """One client for all: its process lives on, out of command, or a new one starts where a test ended it."""
+    lasting.begin_epoch(0)
+    yield lasting
+    lasting.stop()
 
 
 def test_one_life_of_a_process(client):

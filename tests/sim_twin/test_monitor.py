@@ -5,7 +5,6 @@ import numpy as np
 import pytest
 
 from config.limits import ArmPart, KeepOut, Plane
-from config.loader import resolve
 from config.posture import part_points
 from sim_twin.allowances import allowances_for
 from sim_twin.monitor import Monitor
@@ -15,22 +14,6 @@ from sim_twin.recorder import PartKind, part_kinds
 from tests.support.monitor_stage import Stage
 
 replace = msgspec.structs.replace
-
-
-@pytest.fixture(scope="module")
-def resolved():
-    return resolve(rig="twin")
-
-
-@pytest.fixture(scope="module")
-def made(resolved):
-    return Stage(resolved)
-
-
-@pytest.fixture
-def stage(made):
-    made.lay_out()
-    return made
 
 
 def test_an_arm_at_rest_breaks_nothing(stage):

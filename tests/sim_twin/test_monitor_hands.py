@@ -4,29 +4,12 @@ import msgspec
 import pytest
 
 from config.limits import Touched
-from config.loader import resolve
 from sim_twin.contacts import pressing_n
 from sim_twin.names import on_table
 from sim_twin.recorder import PartKind, Touch
 from tests.support.monitor_stage import Stage
 
 replace = msgspec.structs.replace
-
-
-@pytest.fixture(scope="module")
-def resolved():
-    return resolve(rig="twin")
-
-
-@pytest.fixture(scope="module")
-def made(resolved):
-    return Stage(resolved)
-
-
-@pytest.fixture
-def stage(made):
-    made.lay_out()
-    return made
 
 
 def press(stage: Stage, name: str, depth_m: float = 0.004) -> None:

@@ -1,6 +1,9 @@
 """Complete run folders made by the toy, for whatever reads run folders."""
 
+import shutil
+from functools import cache
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 from config.loader import resolve
 from config.resolved import dump_resolved
@@ -39,12 +42,21 @@ def toy_manifest(*, seed=0, learner="toy", scenario="lamps", changes=(CHANGE_EPO
 
 
 def make_toy_folder(path: Path, *, seed=0, learner="toy") -> RunFolder:
-    """Run the toy in a folder and return it."""
+    """Return a folder with a whole run of the toy in it, one's own to spoil."""
+    shutil.copytree(Path(_ran(seed, learner).name) / "run", path, dirs_exist_ok=True)
+    return RunFolder(path)
+
+
+@cache
+def _ran(seed: int, learner: str) -> TemporaryDirectory[str]:
+    """Run the toy, once for all who ask for a copy: the same seed makes the same run."""
+    kept = TemporaryDirectory(prefix="autotelic-toy-")
+    path = Path(kept.name) / "run"
     folder = RunFolder(path)
     with folder:
         folder.start(toy_manifest(seed=seed, learner=learner), dump_resolved(resolve()))
         ToyRun(path, PROTOCOL, seed=seed).go()
-    return folder
+    return kept
 
 
 def make_started_toy_folder(path: Path) -> RunFolder:

@@ -4,6 +4,7 @@ import json
 import socket
 import time
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from datetime import UTC, datetime, timedelta
 
 import pytest
@@ -12,7 +13,7 @@ import zenoh
 from robot.bus import Bus, Role, link
 from robot.bus.errors import BusConfigError, BusError
 from robot.bus.keys import Keyring
-from robot.bus.keys.guard import guard_of
+from robot.bus.keys.guard import Guard, guard_of
 from robot.bus.topic import key_of
 from robot.bus.topics import QUERIES, RESET, TOPICS, TRUTH, ResetRequest
 from robot.messages import SceneState
@@ -56,13 +57,21 @@ def hub(keyring, endpoint):
         yield bus
 
 
+@contextmanager
+def listening(raw):
+    """Yield everything that any key brings to a hub, who answers whatever it is asked."""
+    samples = []
+    subscriber = raw.declare_subscriber("**", lambda sample: samples.append(str(sample.key_expr)))
+    queryable = raw.declare_queryable("**", lambda query: query.reply(query.key_expr, b"done"))
+    yield samples
+    queryable.undeclare()
+    subscriber.undeclare()
+
+
 @pytest.fixture
 def seen(hub):
-    """Everything that any key brings to the hub."""
-    samples = []
-    subscriber = hub.raw().declare_subscriber("**", lambda sample: samples.append(str(sample.key_expr)))
-    yield samples
-    subscriber.undeclare()
+    with listening(hub.raw()) as samples:
+        yield samples
 
 
 def join(endpoint, folder, role, **more):
@@ -87,7 +96,7 @@ def test_a_rightful_process_reads_and_asks_over_an_encrypted_link(hub, keyring, 
             asked.result()
 
 
-def strike(endpoint, keyring, source, asked):
+def strike(endpoint, keyring, source, asked, wait_s=0.1):
     """With a process's certificate, past our own door: put on every topic, ask these queries; return who answered."""
     guard = guard_of(keyring.folder, source, is_hub=False, now=datetime.now(UTC))
     raw = link.open_link(endpoint, is_hub=False, guard=guard)
@@ -95,7 +104,7 @@ def strike(endpoint, keyring, source, asked):
         for topic in TOPICS:
             raw.put(key_of(SERIAL, topic.name), b"forged")
         keys = [key_of(SERIAL, query.name) for query in asked]
-        answered = [str(reply.ok or reply.err) for key in keys for reply in raw.get(key, payload=b"{}", timeout=0.1)]
+        answered = [str(reply.ok or reply.err) for key in keys for reply in raw.get(key, payload=b"{}", timeout=wait_s)]
         time.sleep(0.2)
     finally:
         raw.close()
@@ -108,6 +117,22 @@ def test_a_certificate_lets_its_role_write_its_own_topics_and_no_other(hub, keyr
     rightful = {key_of(SERIAL, topic.name) for topic in TOPICS if role in topic.writers}
     assert set(seen) == rightful
     assert answered == []
+
+
+@pytest.mark.parametrize("source", ["viewer", "gone"])
+def test_without_the_rules_the_same_strike_is_seen_on_every_topic_and_every_question_answered(keyring, source):
+    there = free_endpoint()
+    ruled = guard_of(keyring.folder, "twin", is_hub=True, now=datetime.now(UTC))
+    bare = Guard(settings={key: value for key, value in ruled.settings.items() if key != "access_control"})
+    assert bare != ruled
+    unruled = link.open_link(there, is_hub=True, guard=bare)
+    try:
+        with listening(unruled) as seen:
+            answered = strike(there, keyring, source, QUERIES, wait_s=15.0)
+            until(lambda: set(seen) == {key_of(SERIAL, topic.name) for topic in TOPICS})
+    finally:
+        unruled.close()
+    assert len(answered) == len(QUERIES)
 
 
 def test_a_revoked_certificate_comes_in_and_can_do_nothing(hub, keyring, endpoint, seen):

@@ -98,7 +98,7 @@ def test_a_stop_takes_about_what_ur_publishes(joint, distance_rad, time_s, is_cu
     assert drive.is_standing
 
 
-@pytest.mark.parametrize("force_n", [10.0, 30.0, 80.0])
+@pytest.mark.parametrize("force_n", [10.0, pytest.param(30.0, marks=pytest.mark.slow), 80.0])
 def test_force_mode_presses_on_the_table_with_what_was_asked(force_n):
     drive = make_drive()
     over_the_table(drive, 0.03)

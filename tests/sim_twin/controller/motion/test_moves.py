@@ -268,7 +268,7 @@ def test_what_is_taken_over_goes_no_further_than_its_speed_takes_it(sliders, n_f
     assert motions.setpoint.q_target == pytest.approx(start, abs=1e-9)
 
 
-@pytest.mark.parametrize("low", [0.02, 0.1, 0.5])
+@pytest.mark.parametrize("low", [pytest.param(0.02, marks=pytest.mark.slow), 0.1, 0.5])
 def test_a_blend_under_a_lowered_slider_goes_the_same_way_slower(low):
     ways = []
     for share in (1.0, low):
