@@ -17,7 +17,7 @@ from learning.stopwatch import Stopwatch
 from learning.subgoal_selector import make_subgoal_selector
 from robot.messages import PlantIdentity, StationSpec
 from robot.operated import OperatedStation
-from robot.rigs import build_operator, build_station
+from robot.rigs import build_operator, find_station
 
 __all__ = ["RobotLearner", "build_agent", "learner_maker"]
 
@@ -38,7 +38,7 @@ class RobotLearner:
         """
         # One small network at a time: more threads cost more than they bring, and the number would change the sums.
         torch.set_num_threads(1)
-        station = build_station(resolved, heard_by=None if stopwatch is None else stopwatch.lap, pictures=pictures)
+        station = find_station(resolved, heard_by=None if stopwatch is None else stopwatch.lap, pictures=pictures)
         self._local = station
         self.station = OperatedStation(station, build_operator(resolved.rig))
         self.station.connect()

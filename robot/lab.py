@@ -13,16 +13,21 @@ from robot.hal.protocols import Resetter, SceneTruth
 from robot.local_station import LocalStation
 from robot.messages import PlantIdentity
 from robot.motion import AskedHand
+from robot.node import NodeAsker, RemoteStation
 from robot.person import TerminalPerson
 from robot.person_reset import PersonLook, PersonResetter
 from robot.person_station import PersonResetStation
 from robot.servo_client import ServoClient
 from robot.station_doors import Perceives
 
-__all__ = ["build_lab_station"]
+__all__ = ["LabWorld", "build_lab_station", "join_robot_node"]
 
 
-class _LabWorld:
+AWAY_S = 30.0
+"""How long a robot node, or the bus's hub, may be away while it is started anew."""
+
+
+class LabWorld:
     """The plant as the bus and the servo process know it (robot.local_station.World)."""
 
     def __init__(self, *, loop: ServoClient, truth: SceneTruth | None, resetter: Resetter) -> None:
@@ -68,7 +73,7 @@ def build_lab_station(
         by_person = PersonResetter(
             scenario=resolved.scenario, loop=loop, scene=truth, person=TerminalPerson(), pictures=pictures
         )
-        world = _LabWorld(loop=loop, truth=truth, resetter=by_person)
+        world = LabWorld(loop=loop, truth=truth, resetter=by_person)
         station = PersonResetStation(
             world=world, loop=loop, perception=perception, arm=arm, scenario=resolved.scenario, rig=rig,
             cell_shows=_pendant_of(rig), arming_signal=_button_of(resolved),
@@ -76,17 +81,46 @@ def build_lab_station(
         station.prepare(by_person, resolved.arm.home_rad)
         return station
     resetter = RemoteResetter(bus, loop=loop, truth=truth)
-    world = _LabWorld(loop=loop, truth=truth, resetter=resetter)
+    world = LabWorld(loop=loop, truth=truth, resetter=resetter)
     return LocalStation(
         world=world, loop=loop, perception=perception, arm=arm, scenario=resolved.scenario, rig=rig,
         hand=AskedHand(arm) if is_driven else None, cell_shows=_pendant_of(rig), arming_signal=_button_of(resolved),
     )  # fmt: skip
 
 
+def join_robot_node(resolved: Resolved, *, is_driven: bool = False) -> RemoteStation | None:
+    """Return the station of the robot node on the rig's bus, disarmed for this process; None where there is none.
+
+    Args:
+        resolved: the rig, and the table that is expected there.
+        is_driven: a person drives.
+
+    Raises:
+        BusError: nobody listens at the bus's endpoint, or there is a robot node that does not answer.
+        RobotConfigError: the robot node has another table, or holds other limits.
+    """
+    rig = resolved.rig
+    if rig.bus is None:
+        return None
+    bus = Bus(rig.bus, serial=rig.expected.serial, role=Role.TELEOP if is_driven else Role.LEARNING, keys=rig.keys)
+    bus.open()
+    try:
+        asker = NodeAsker(bus, wait_s=AWAY_S)
+        if not asker.is_anybody():
+            bus.close()
+            return None
+        station = RemoteStation(bus, asker=asker, is_driven=is_driven)
+        station.expect(scenario=resolved.scenario.name, profile=rig.profile)
+    except BaseException:
+        bus.close()
+        raise
+    return station
+
+
 def _driven_station(resolved: Resolved, perception: Perceives) -> LocalStation:
     """Return the station of an arm that a person drives and whose table a person sees to."""
     loop, arm = ServoClient(resolved), limited(resolved.arm, resolved.profile)
-    world = _LabWorld(loop=loop, truth=None, resetter=PersonLook(loop=loop, person=TerminalPerson()))
+    world = LabWorld(loop=loop, truth=None, resetter=PersonLook(loop=loop, person=TerminalPerson()))
     return LocalStation(
         world=world, loop=loop, perception=perception, arm=arm, scenario=resolved.scenario, rig=resolved.rig,
         hand=AskedHand(arm), cell_shows=_pendant_of(resolved.rig),

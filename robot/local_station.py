@@ -190,6 +190,37 @@ class LocalStation:
         self._hold_to_grant()
         return lease
 
+    @property
+    def lease_number(self) -> int:
+        """Of the lease in force; 0 where there is none."""
+        grant = self._tenure.grant
+        return 0 if grant is None else grant.lease
+
+    def renew_lease(self) -> None:
+        """Say that who has the lease is still there; one that has ended stays so."""
+        self._tenure.renew()
+
+    def let_go(self) -> None:
+        """Let go of the lease: the arm is stopped and disarmed; a latch stays."""
+        was_engaged = self._arming.is_engaged
+        self._tenure.end()
+        if was_engaged:
+            self._loop.stop()
+
+    def give_hand(self, hand: Hand) -> None:
+        """Have another decide what the fingers do, before it is engaged.
+
+        Raises:
+            SafetyError: it is engaged.
+        """
+        if self._arming.is_engaged:
+            raise SafetyError("another hand: expected a station that is not engaged, it is")
+        self._reflexes = hand
+
+    def measure(self) -> ArmState:
+        """Read the arm, in command of it or not. Moves nothing."""
+        return self._loop.measure()
+
     def stop(self, *, by: str) -> None:
         """Stop the arm. Anybody may, whoever has the lease: what was engaged latches, what was armed is disarmed."""
         was_engaged = self._arming.is_engaged

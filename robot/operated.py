@@ -2,7 +2,8 @@
 
 An arm may stop at any moment, also while its table is laid out and command is taken for the next epoch. That is a latch
 like any other: the operator arms again, as often as the latch limit allows, and the reset is done once more. A wire
-that fails while the station is latched counts as no latch; it is tried five times.
+that fails while the station is latched counts as no latch; it is tried five times. So it is where the station was
+disarmed meanwhile, because its lease ended or the process that holds it was started anew.
 """
 
 from collections.abc import Callable
@@ -83,6 +84,8 @@ class OperatedStation:
     def reset(self, *, seed: int, epoch: int) -> Percept:
         """Lay the table out for an epoch; after a latch the operator first resets the plant and arms again.
 
+        One that was disarmed is armed again by the operator too.
+
         Where the arm is lost on the way, or a wire fails, it is done once more.
 
         Raises:
@@ -99,11 +102,11 @@ class OperatedStation:
             except (RobotConfigError, TooManyLatchesError):
                 raise
             except RobotError as error:
-                is_latched = self._station.state.mode is StationMode.LATCHED
+                is_down = self._station.state.mode in (StationMode.LATCHED, StationMode.DISARMED)
                 is_new = self._station.n_latches > n_latches
                 n_failed = 0 if is_new else n_failed + 1
                 is_borne = is_new or (isinstance(error, WireError) and n_failed < MOST_FAILED)
-                if self._operator is None or not is_latched or not is_borne:
+                if self._operator is None or not is_down or not is_borne:
                     raise
             else:
                 self.n_resets += 1
@@ -111,8 +114,11 @@ class OperatedStation:
             self._pause(PAUSE_S)
 
     def _reset(self, *, seed: int, epoch: int) -> Percept:
-        if self._operator is not None and self._station.state.mode is StationMode.LATCHED:
+        mode = self._station.state.mode
+        if self._operator is not None and mode is StationMode.LATCHED:
             self._operator.rearm(self._station, seed=seed, epoch=epoch)
+        elif self._operator is not None and mode is StationMode.DISARMED:
+            self._operator.arm_once(self._station)
         return self._station.reset(seed=seed, epoch=epoch)
 
     def step(self, intent: Intent, *, duration_s: float | None = None) -> StepResult:

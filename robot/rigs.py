@@ -24,17 +24,20 @@ from robot.tick_loop import TickLoop
 from robot.timed import time_world
 
 if TYPE_CHECKING:
+    from robot.node import RemoteStation
     from robot.teleop.preview import Shadow
     from robot.teleop.view import View
 
 __all__ = [
     "build_operator",
+    "build_perception",
     "build_plant",
     "build_shadow",
     "build_station",
     "build_view",
     "check_learnable",
     "check_usable",
+    "find_station",
     "load",
 ]
 
@@ -100,6 +103,35 @@ def build_station(
         hand=AskedHand(held) if is_driven else None, cell_shows=cell_shows, host_ns=host_ns,
         arming_signal=None if resolved.cell is None else resolved.cell.arming_signal,
     )  # fmt: skip
+
+
+def find_station(
+    resolved: Resolved,
+    *,
+    heard_by: Callable[[str], None] | None = None,
+    pictures: Path = Path("resets"),
+    is_driven: bool = False,
+) -> "LocalStation | RemoteStation":
+    """Return the station of a rig: of the robot node on its bus where there is one, else one of this process's own.
+
+    Where a person lays the table out it is this process's own, whose terminal he sits at.
+    """
+    rig = resolved.rig
+    check_usable(rig)
+    if rig.bus is not None and rig.reset == "twin":
+        found = load("robot.lab:join_robot_node")(resolved, is_driven=is_driven)
+        if found is not None:
+            return found
+    return build_station(resolved, heard_by=heard_by, pictures=pictures, is_driven=is_driven)
+
+
+def build_perception(resolved: Resolved) -> Perceives:
+    """Return what makes percepts on a rig.
+
+    Raises:
+        RobotConfigError: it names nothing for it.
+    """
+    return _perception_of(resolved, is_driven=False)
 
 
 def _perception_of(resolved: Resolved, *, is_driven: bool) -> Perceives:

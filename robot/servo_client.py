@@ -80,6 +80,9 @@ class ServoClient:
         self._process: BaseProcess | None = None
         self._connection: Connection | None = None
         self._watch: ServoWatch | None = None
+        self._context = get_context("spawn")
+        self._halt = self._context.RawArray("q", 1)
+        """Shared memory: a stop was asked for, whatever the pipe is busy with."""
         self._is_leaving = False
         """It has said that it lost its arm, or its end of the pipe is closed."""
         self._is_answer_due = False
@@ -140,10 +143,11 @@ class ServoClient:
         self.await_rest()
         if self._leftover is not None:
             self._leftover.wait()
-        context = get_context("spawn")
-        ours, theirs = context.Pipe()
-        pulse = context.RawArray("q", 1)
-        process = context.Process(target=serve, args=(theirs, self._resolved_json, pulse), daemon=True)
+        ours, theirs = self._context.Pipe()
+        pulse = self._context.RawArray("q", 1)
+        process = self._context.Process(
+            target=serve, args=(theirs, self._resolved_json, pulse, self._halt), daemon=True
+        )
         process.start()
         theirs.close()
         self._process, self._connection = process, ours
@@ -160,6 +164,7 @@ class ServoClient:
         """Take command of the arm; a process that has ended is started anew, and what was lost before is forgotten."""
         self.connect()
         self._told = self._why_lost = None
+        self._halt[0] = 0
         try:
             self._ask(Engage(), Done, ENGAGE_S)
         except RobotError as error:
@@ -188,6 +193,10 @@ class ServoClient:
                 return
         if self._process is None or not self._process.is_alive():
             self._kill()
+
+    def halt(self) -> None:
+        """Have the arm stopped and latched within a tick, from any thread, also amid a time step. Waits for nothing."""
+        self._halt[0] = 1
 
     def await_rest(self) -> None:
         """Wait until an arm that was lost must be at rest, by its process or its own watchdog; others rest already."""

@@ -18,7 +18,7 @@ not vanish from under an epoch that is to be finished.
 import os
 import signal
 import sys
-from collections.abc import Callable, MutableSequence
+from collections.abc import Callable, MutableSequence, Sequence
 from multiprocessing.connection import Connection
 from time import monotonic_ns
 
@@ -78,13 +78,16 @@ EXIT_TERMINATED = 143
 NOT_TICKING = 0
 
 
-def serve(connection: Connection, resolved_json: bytes, pulse: MutableSequence[int]) -> None:
+def serve(
+    connection: Connection, resolved_json: bytes, pulse: MutableSequence[int], halt: MutableSequence[int]
+) -> None:
     """Run a servo process until its station lets go of it.
 
     Args:
         connection: the pipe to the station.
         resolved_json: everything the rig is made of.
         pulse: shared memory of one number: ticks so far while it ticks, otherwise 0.
+        halt: shared memory of one number: other than 0 once somebody said stop.
 
     SIGTERM stops the arm and ends it too. It does not return: ruckig's binding would tell of some thirty leaks at the
     interpreter's end, over what a person is to read.
@@ -125,6 +128,7 @@ def serve(connection: Connection, resolved_json: bytes, pulse: MutableSequence[i
         loop=loop,
         arm=resolved.arm,
         pulse=pulse,
+        halt=halt,
         die=die,
         pin=pin,
     )
@@ -155,6 +159,7 @@ class ServoServer:
         loop: its loop, which tells `latched`.
         arm: the arm's file.
         pulse: shared memory of one number: ticks so far while it ticks, otherwise 0.
+        halt: shared memory of one number: other than 0 once somebody said stop, past the pipe and whoever commands.
         die: ends the process on the spot.
         pin: keeps this thread on a CPU of its own while it is in command.
         host_ns: the host's monotonic time, by which a station is silent; the arm's own says how old an intent is.
@@ -168,6 +173,7 @@ class ServoServer:
         loop: TickLoop,
         arm: ArmConfig,
         pulse: MutableSequence[int],
+        halt: Sequence[int] = (0,),
         die: Callable[[], object],
         pin: CpuPin,
         host_ns: Callable[[], int] = monotonic_ns,
@@ -177,7 +183,7 @@ class ServoServer:
         self._intent_max_age_ns = round(arm.motion.intent_max_age_s * 1e9)
         self._silent_ns = SILENT_AGES * self._intent_max_age_ns
         self._begin_ticks = round(BEGIN_S * plant.arm.spec.rate_hz)
-        self._pulse, self._die = pulse, die
+        self._pulse, self._halt, self._die = pulse, halt, die
         self._decode = msgspec.msgpack.Decoder(Request).decode
         self._encode = msgspec.msgpack.Encoder().encode
         self._is_in_command = self._is_over = self._is_beginning = False
@@ -224,6 +230,10 @@ class ServoServer:
 
     def _tick(self) -> None:
         assert self._grip is not None, "seeding sets it"
+        if self._halt[0]:
+            self._loop.latch(Reason.STOP, "somebody said stop over the bus")
+            self._end_unless_stopped()
+            return
         verdict = self._loop.tick(self._grip)
         if verdict is not None:
             self._end_unless_stopped()

@@ -1,19 +1,21 @@
 """The one table of topics. Keys are below the serial of the plant that they are about.
 
-`virtual_lab` runs on twin/truth, station/reset and twin/cell today; the other rows are there for the processes to come.
-Rates and deadlines are starting points.
+Rates and deadlines are starting points. Two rows have one key for many writers, told apart by the source in each
+envelope: `health` of every process, and `intent`, of which a robot node takes only what comes under the lease in force.
 """
 
 from typing import Any
 
 import msgspec
 
-from robot.bus.topic import Priority, Query, Role, Topic
+from robot.bus.station_rows import Beat, Command, Health, StationAsk, StationReport, StationTold, StepDone, StopAsk
+from robot.bus.topic import Keep, Priority, Query, Role, Topic
 from robot.messages import ArmCommand, ArmState, Percept, SceneState, Verdict
 
 __all__ = [
-    "ARM_STATE", "CELL", "PERCEPT", "PING", "QUERIES", "REQUESTED", "RESET", "SENT", "TOPICS", "TRUTH", "VERDICT",
-    "CellAction", "CellTruth", "Ping", "Pong", "ResetDone", "ResetRequest",
+    "ARM_STATE", "ASK", "BEAT", "CELL", "HEALTH", "INTENT", "LAY_OUT", "PERCEPT", "PING", "QUERIES", "REPORT",
+    "REQUESTED", "RESET", "SENT", "STEP", "STOP", "TOPICS", "TRUTH", "VERDICT", "CellAction", "CellTruth", "Ping",
+    "Pong", "ResetDone", "ResetRequest",
 ]  # fmt: skip
 
 
@@ -64,6 +66,8 @@ class Pong(msgspec.Struct, frozen=True, kw_only=True):
     """Of that clock."""
 
 
+COMMANDERS = (Role.LEARNING, Role.TELEOP)
+
 ARM_STATE = Topic(
     name="arm/state", kind=ArmState, writers=(Role.ROBOT,), rate_hz=50.0, deadline_s=0.06, priority=Priority.REAL_TIME
 )
@@ -82,8 +86,26 @@ TRUTH = Topic(
     name="twin/truth", kind=SceneState, writers=(Role.TWIN,), rate_hz=100.0, deadline_s=0.1, priority=Priority.DATA_HIGH
 )
 PERCEPT = Topic(
-    name="percept", kind=Percept, writers=(Role.PERCEPTION,), rate_hz=30.0, deadline_s=0.15,
+    name="percept", kind=Percept, writers=(Role.PERCEPTION, Role.ROBOT), rate_hz=20.0, deadline_s=0.15,
     priority=Priority.INTERACTIVE_HIGH,
+)  # fmt: skip
+"""Written by the robot node at the end of each time step, as long as it perceives by itself."""
+INTENT = Topic(
+    name="intent", kind=Command, writers=COMMANDERS, rate_hz=20.0, deadline_s=0.1, priority=Priority.REAL_TIME,
+)  # fmt: skip
+STEP = Topic(name="station/step", kind=StepDone, writers=(Role.ROBOT,), rate_hz=20.0, priority=Priority.REAL_TIME)
+BEAT = Topic(
+    name="lease", kind=Beat, writers=COMMANDERS, rate_hz=5.0, deadline_s=0.5, priority=Priority.INTERACTIVE_HIGH,
+    is_recorded=False,
+)  # fmt: skip
+STOP = Topic(name="stop", kind=StopAsk, writers=tuple(Role), priority=Priority.REAL_TIME, keep=Keep.ALL)
+"""Anybody's, whatever else he may not write."""
+REPORT = Topic(
+    name="station/state", kind=StationReport, writers=(Role.ROBOT,), rate_hz=10.0, deadline_s=0.5,
+    priority=Priority.INTERACTIVE_HIGH,
+)  # fmt: skip
+HEALTH = Topic(
+    name="health", kind=Health, writers=tuple(Role), rate_hz=2.0, deadline_s=1.0, priority=Priority.DATA,
 )  # fmt: skip
 
 RESET = Query(
@@ -99,8 +121,20 @@ CELL = Query(
     asked_by=(Role.ROBOT,),
     answer_s=5.0,
 )
+ASK = Query(
+    name="station/ask", request=StationAsk, reply=StationTold, answered_by=(Role.ROBOT,), asked_by=COMMANDERS,
+    answer_s=40.0,
+)  # fmt: skip
+"""Leases and arming. Taking command of an arm takes some seconds."""
+LAY_OUT = Query(
+    name="station/lay_out", request=StationAsk, reply=StationTold, answered_by=(Role.ROBOT,), asked_by=COMMANDERS,
+    answer_s=60.0,
+)  # fmt: skip
+"""The same, for what lays the table out."""
 PING = Query(name="bus/ping", request=Ping, reply=Pong, answered_by=tuple(Role), asked_by=tuple(Role), answer_s=1.0)
 """Answered by every process on the bus."""
 
-TOPICS: tuple[Topic[Any], ...] = (ARM_STATE, REQUESTED, SENT, VERDICT, TRUTH, PERCEPT)
-QUERIES: tuple[Query[Any, Any], ...] = (RESET, CELL, PING)
+TOPICS: tuple[Topic[Any], ...] = (
+    ARM_STATE, REQUESTED, SENT, VERDICT, TRUTH, PERCEPT, INTENT, STEP, BEAT, STOP, REPORT, HEALTH,
+)  # fmt: skip
+QUERIES: tuple[Query[Any, Any], ...] = (RESET, CELL, ASK, LAY_OUT, PING)

@@ -61,6 +61,7 @@ class Reason(StrEnum):
     WIRE = "wire"
     STALE_INTENT = "stale_intent"
     STALE_PERCEPT = "stale_percept"
+    STOP = "stop"
     ARM_MODE = "arm_mode"
     JOINT_RANGE = "joint_range"
     JOINT_SPEED = "joint_speed"

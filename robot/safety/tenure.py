@@ -55,6 +55,11 @@ class Tenure:
         assert grant is not None, "it was just renewed"
         return grant
 
+    def renew(self) -> None:
+        """Say that the source is still there; a lease that has ended stays so."""
+        if self._lease is not None and self._book.is_in_force(self._lease):
+            self._book.renew(self._lease)
+
     def holds(self) -> bool:
         """Disarm where what the station was armed for is gone. Returns False where that took motion away just now."""
         was_engaged = self._arming.is_engaged

@@ -3,6 +3,7 @@
 import signal
 from contextlib import ExitStack
 from time import monotonic_ns
+from typing import Protocol
 
 import msgspec
 import typer
@@ -11,13 +12,13 @@ from rich.console import Console
 from config.loader import resolve
 from config.resolved import Resolved
 from robot.errors import RobotConfigError, RobotError
-from robot.local_station import LocalStation
 from robot.messages import StationMode, StationState
 from robot.person import PersonOperator, TerminalPerson
-from robot.rigs import build_operator, build_shadow, build_station, build_view
+from robot.rigs import build_operator, build_shadow, build_view, find_station
+from robot.safety import Armable
 from robot.stop_request import StopRequest
 from robot.teleop.device import open_device
-from robot.teleop.driver import DriveEnd, Driver, DriveView, Pace, Unpaced
+from robot.teleop.driver import DriveEnd, DrivenStation, Driver, DriveView, Pace, Unpaced
 from robot.teleop.jog import Jog, JogLimits
 from robot.teleop.pace import WallPace
 from robot.teleop.preview import AheadPreview
@@ -36,6 +37,10 @@ END_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 """Ctrl-C, a polite kill, and a terminal or an SSH connection that went away; only Ctrl-C twice ends at once."""
 LEASE_NS = 1_000_000_000
 """A drive loop that did not come round for so long is gone: the arm is disarmed."""
+
+
+class DrivenArm(DrivenStation, Armable, Protocol):
+    """A driven station that an operator can arm."""
 
 
 class DriveOptions(msgspec.Struct, frozen=True, kw_only=True):
@@ -70,7 +75,7 @@ def run_drive(options: DriveOptions) -> None:
     console = Console(stderr=True)
     with ExitStack() as stack:
         end = stack.enter_context(StopRequest(signals=END_SIGNALS, at_once=(signal.SIGINT,)))
-        station = stack.enter_context(build_station(resolved, is_driven=True))
+        station = stack.enter_context(find_station(resolved, is_driven=True))
         station.take_lease(f"teleop by {device.name}", life_ns=None if options.is_script else LEASE_NS)
         _arm(station, resolved, seed=options.seed)
         view = _open_view(resolved, console, stack) if options.view else None
@@ -94,7 +99,7 @@ def run_drive(options: DriveOptions) -> None:
 class _Shown:
     """Shows every step in the terminal and, where there is one, in the live view."""
 
-    def __init__(self, readout: ReadOut, view: View | None, station: LocalStation) -> None:
+    def __init__(self, readout: ReadOut, view: View | None, station: DrivenArm) -> None:
         self._readout, self._view, self._station = readout, view, station
 
     def __call__(self, view: DriveView) -> None:
@@ -128,7 +133,7 @@ def _open_preview(resolved: Resolved, stack: ExitStack) -> AheadPreview:
 class Rearm:
     """Asks whoever sits at the terminal; each time it lays another table out, where a twin does that."""
 
-    def __init__(self, station: LocalStation, readout: ReadOut, *, is_person: bool, seed: int) -> None:
+    def __init__(self, station: DrivenArm, readout: ReadOut, *, is_person: bool, seed: int) -> None:
         self._station, self._readout, self._seed = station, readout, seed
         self._is_person = is_person
         self._n_resets = 0
@@ -148,7 +153,7 @@ class Rearm:
         return True
 
 
-def _arm(station: LocalStation, resolved: Resolved, *, seed: int) -> None:
+def _arm(station: DrivenArm, resolved: Resolved, *, seed: int) -> None:
     """Let the rig's operator arm the station, and a twin lay its table out."""
     operator = build_operator(resolved.rig) or PersonOperator()
     operator.arm_once(station)

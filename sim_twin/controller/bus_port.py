@@ -7,6 +7,7 @@ answered with an error before anything else: it unlocks and ends nothing.
 """
 
 from robot.bus import CELL, RESET, TRUTH, Asked, Bus, CellAction, CellTruth, ResetDone, ResetRequest, Role
+from robot.node import HealthTeller, Pulse
 from sim_twin.controller.robot import VirtualRobot
 from sim_twin.controller.table_hands import TableHands
 from sim_twin.controller.wire.dashboard_target import Outcome
@@ -14,7 +15,7 @@ from sim_twin.plant import TwinTruth
 
 __all__ = ["BusPort"]
 
-TRUTH_SLICES = 5
+TRUTH_SLICES, SLICES_PER_S = 5, 500.0
 PATIENCE_SLICES = 500
 """How long a program may take to end, and the arm to come to rest, once a reset was asked for."""
 
@@ -43,6 +44,8 @@ class BusPort:
         self._publisher = self._bus.publisher(TRUTH)
         self._resets, self._actions = self._bus.answerer(RESET), self._bus.answerer(CELL)
         self._hands = TableHands(robot.machine.world)
+        self._pulse = Pulse(target_hz=SLICES_PER_S)
+        self._health = HealthTeller(self._bus, self._pulse)
         self._n_patience = 0
         self._asked: _Reset | None = None
         """A reset that waits for the arm to be unlocked, or to come to rest."""
@@ -54,6 +57,7 @@ class BusPort:
 
     def tick(self, n_slices: int) -> None:
         """Answer what was asked, and publish when it is time."""
+        self._pulse.beat()
         reset, self._asked = self._asked, None
         if reset is None:
             reset, self._n_patience = self._resets.next(), PATIENCE_SLICES
@@ -67,6 +71,7 @@ class BusPort:
 
     def close(self) -> None:
         """Leave the bus. Idempotent."""
+        self._health.close()
         self._bus.close()
 
     def _answer(self, reset: _Reset) -> None:

@@ -1,0 +1,91 @@
+"""Questions to a robot node that may be away for a while: it is started anew, or the bus's hub is."""
+
+from collections.abc import Callable
+from time import monotonic, sleep
+
+from robot import errors
+from robot.bus.errors import BusError
+from robot.bus.queries import Asker
+from robot.bus.session import Bus
+from robot.bus.station_rows import Describe, Failed, LayOut, ResetPlant, StationAsk, StationTold, Work
+from robot.bus.topics import ASK, LAY_OUT
+from robot.errors import RobotError, WireError
+
+__all__ = ["NodeAsker", "error_of"]
+
+AGAIN_S = 0.3
+
+
+def error_of(failed: Failed) -> RobotError:
+    """Return the error that the robot node raised, or its nearest kind."""
+    kind = getattr(errors, failed.kind, None)
+    return kind(failed.message) if isinstance(kind, type) and issubclass(kind, RobotError) else _other(failed)
+
+
+def _other(failed: Failed) -> RobotError:
+    from robot.safety import TooManyLatchesError  # not among robot.errors
+
+    if failed.kind == TooManyLatchesError.__name__:
+        return TooManyLatchesError(failed.message)
+    return WireError(f"{failed.kind}: {failed.message}")
+
+
+class NodeAsker:
+    """Asks, and asks again where nobody answers.
+
+    Args:
+        bus: open.
+        wait_s: for how long.
+        pause: waits for so many seconds.
+    """
+
+    def __init__(self, bus: Bus, *, wait_s: float, pause: Callable[[float], object] = sleep) -> None:
+        self._ask, self._lay_out = bus.asker(ASK), bus.asker(LAY_OUT)
+        self._wait_s, self._pause = wait_s, pause
+
+    def is_anybody(self) -> bool:
+        """Ask once whether there is a robot node.
+
+        Raises:
+            BusError: there is one that does not answer, or of another version.
+        """
+        answers: list[StationTold] = []
+        self._ask.ask_each(StationAsk(work=Describe()), answers.append)
+        return bool(answers)
+
+    def ask(self, work: Work, *, lease: str = "", number: int = 0) -> StationTold:
+        """Return what came of it.
+
+        Raises:
+            BusError: nobody answers for so long.
+            RobotError: what the robot node raised.
+        """
+        told = self._told(StationAsk(work=work, lease=lease, number=number))
+        if told.failed is not None:
+            raise AnsweredError(error_of(told.failed), told)
+        return told
+
+    def _told(self, request: StationAsk) -> StationTold:
+        asker: Asker[StationAsk, StationTold] = (
+            self._lay_out if isinstance(request.work, LayOut | ResetPlant) else self._ask
+        )
+        end_s = monotonic() + self._wait_s
+        while True:
+            answers: list[StationTold] = []
+            asker.ask_each(request, answers.append)
+            if answers:
+                return answers[0]
+            if monotonic() > end_s:
+                raise BusError(
+                    f"station: expected a robot node that answers within {self._wait_s:g} s, none came; does "
+                    "`autotelic up` run, or `autotelic node robot`?"
+                )
+            self._pause(AGAIN_S)
+
+
+class AnsweredError(Exception):
+    """A robot node answered that it failed; what it told besides is there too."""
+
+    def __init__(self, error: RobotError, told: StationTold) -> None:
+        super().__init__(str(error))
+        self.error, self.told = error, told

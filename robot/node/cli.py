@@ -1,0 +1,31 @@
+"""`autotelic node`: one process of a rig, as `autotelic up` starts it. The edge."""
+
+from typing import Annotated
+
+import typer
+
+from config.loader import resolve
+from robot.stop_request import StopRequest
+
+__all__ = ["app"]
+
+app = typer.Typer(no_args_is_help=True, help="One process of a rig, as `autotelic up` starts it.")
+
+
+@app.callback()
+def _group() -> None:
+    """Turn it into a group, whatever nodes there are."""
+
+
+@app.command()
+def robot(
+    rig: Annotated[str, typer.Option(help="A shipped rig's name or a file.")] = "virtual_lab",
+    scenario: Annotated[str, typer.Option(help="A shipped scenario's name or a file.")] = "paper",
+) -> None:
+    """Hold a rig's arm and serve it over the bus until Ctrl-C. Arms nothing by itself."""
+    from robot.node.lab_node import open_robot_node  # brings the bus and the arm's client
+
+    resolved = resolve(rig=rig, scenario=scenario)
+    with StopRequest() as end, open_robot_node(resolved) as node:
+        typer.echo(f"robot node of {resolved.rig.name}: disarmed, waits for a source at {resolved.rig.bus}", err=True)
+        node.run(end)

@@ -1,0 +1,67 @@
+"""What a robot node needs of the station that it serves."""
+
+from typing import Protocol
+
+from robot.messages import ArmState, Percept
+from robot.safety import Armable, Lease
+from robot.station import Station
+
+__all__ = ["ServedStation"]
+
+
+class ServedStation(Station, Armable, Protocol):
+    """A station with a lease; robot.local_station.LocalStation is one."""
+
+    @property
+    def model_sha256(self) -> str | None:
+        """Digest of the world's model, where it is a simulated one."""
+        ...
+
+    @property
+    def n_latches(self) -> int:
+        """How often it has latched."""
+        ...
+
+    @property
+    def latch_reasons(self) -> tuple[str, ...]:
+        """Why, oldest first."""
+        ...
+
+    @property
+    def lease_number(self) -> int:
+        """Of the lease in force; 0 where there is none."""
+        ...
+
+    @property
+    def measured(self) -> ArmState:
+        """What the arm measured last, once it was engaged."""
+        ...
+
+    @property
+    def percept(self) -> Percept:
+        """What was perceived last, once it was engaged."""
+        ...
+
+    def measure(self) -> ArmState:
+        """Read the arm, in command of it or not. Moves nothing."""
+        ...
+
+    def take_lease(self, source: str, *, life_ns: int | None = None) -> Lease:
+        """Give the lease to a source. Raises SafetyError where another has it."""
+        ...
+
+    def hand_over(self, to: str, *, life_ns: int | None = None) -> Lease:
+        """Give the lease to another source; the arm is stopped and disarmed."""
+        ...
+
+    def renew_lease(self) -> None:
+        """Say that who has the lease is still there; one that has ended stays so."""
+        ...
+
+    def let_go(self) -> None:
+        """Let go of the lease: the arm is stopped and disarmed; a latch stays."""
+        ...
+
+    def stop(self, *, by: str) -> None:
+        """Stop the arm. Anybody may."""
+        ...
