@@ -16,6 +16,7 @@ from learning.ended import Ended
 from learning.errors import LearningError, RunFolderError
 from learning.figures import curriculum_figure, performance_figure, save
 from learning.progress import Progress, Status
+from learning.recording import RecordWanted
 from learning.report import Run, group_runs, load_run, load_runs, report_of
 from learning.run_folder import RunFolder
 from learning.stopwatch import Stopwatch
@@ -33,6 +34,10 @@ STOPPING = (
     "stopping after this epoch and the evaluations that are due or under way "
     "(once more: at once, losing what came after the last checkpoint)"
 )
+
+Record = Annotated[bool, typer.Option("--record", help="Record the session to one MCAP file, in the run's folder.")]
+RecordTo = Annotated[Path | None, typer.Option(help="The same, to this file.")]
+Person = Annotated[str, typer.Option(help="Who attends, as they want to be called in what is recorded.")]
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -61,7 +66,10 @@ def learn(
     epochs: Annotated[int | None, typer.Option(min=1, help="Epochs, in place of the learner's own number.")] = None,
     out: Annotated[Path | None, typer.Option(help="Run folder.  [default: runs/SCENARIO-PRESET-SEED]")] = None,
     workers: Annotated[int | None, typer.Option(min=0, help="Evaluation processes beside this one.")] = None,
+    record_to: RecordTo = None,
+    person: Person = "unnamed",
     *,
+    record: Record = False,
     resume: Annotated[
         bool, typer.Option("--resume", help="Go on with the run in the folder, if there is one.")
     ] = False,
@@ -80,9 +88,12 @@ def learn(
     folder = RunFolder(out or _default_folder(wanted))
     console = Console(stderr=True)
     stopwatch = Stopwatch(perf_counter)
+    recorded = RecordWanted.of(record_to, is_asked=record, person=person, tell=_tell_loss)
     with folder:
         consent = Consent(folder, workers=workers)
-        session = open_session(folder, wanted, resume=resume, stopwatch=stopwatch, consent=consent)
+        session = open_session(
+            folder, wanted, resume=resume, stopwatch=stopwatch, consent=consent, record=recorded
+        )  # fmt: skip
         try:
             ended = _run(session, folder, console, consent.n_workers)
         finally:
@@ -94,6 +105,10 @@ def learn(
         typer.echo(msgspec.json.encode(run.summary).decode())
     else:
         _tell(run, ended)
+
+
+def _tell_loss(why: str) -> None:
+    typer.echo(f"recording: {why}", err=True)
 
 
 def _run(session: "Session", folder: RunFolder, console: Console, n_workers: int) -> Ended:

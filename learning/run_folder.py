@@ -24,6 +24,7 @@ CONFIG_NAME = "config.yaml"
 MANIFEST_NAME = "run.json"
 PROFILE_NAME = "profile.json"
 STOPS_NAME = "stops.json"
+SESSION_SUFFIX = ".mcap"
 
 Share = Annotated[float, Meta(ge=0.0, le=1.0)]
 
@@ -247,4 +248,4 @@ def _refuse_strange_optima(path: Path, manifest: Manifest) -> None:
 
 def _is_left_over(entry: Path) -> bool:
     """Whether a file is what a start that was killed half-way leaves behind."""
-    return entry.name in ("lock", MANIFEST_NAME) or entry.suffix == ".tmp"
+    return entry.name in ("lock", MANIFEST_NAME) or entry.suffix in (".tmp", SESSION_SUFFIX)

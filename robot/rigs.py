@@ -21,6 +21,7 @@ from robot.own_senses import OwnSenses
 from robot.safety import Operator
 from robot.station_doors import Perceives
 from robot.tick_loop import TickLoop
+from robot.tick_tap import TickTap
 from robot.timed import time_world
 
 if TYPE_CHECKING:
@@ -68,6 +69,7 @@ def build_station(
     is_driven: bool = False,
     cell_shows: Callable[[str], None] | None = None,
     host_ns: Callable[[], int] = monotonic_ns,
+    tap: TickTap | None = None,
 ) -> LocalStation:
     """Return the station of a resolved config, disarmed and not yet connected.
 
@@ -80,6 +82,7 @@ def build_station(
             is good enough.
         cell_shows: Shows a text at the cell of an arm that is held in this process; a rig with a bus has its own.
         host_ns: This process's monotonic time, for leases and answers at the cell; never for motion.
+        tap: Hears of every tick, where the arm is held in this process.
     """
     rig, arm, scenario = resolved.rig, resolved.arm, resolved.scenario
     check_usable(rig)
@@ -92,8 +95,9 @@ def build_station(
     if heard_by is not None:
         time_world(world, heard_by)
     loop = TickLoop(
-        arm=world.arm, config=arm, scenario=scenario, rule_sets=resolved.rule_sets, rig=rig, profile=resolved.profile
-    )
+        arm=world.arm, config=arm, scenario=scenario, rule_sets=resolved.rule_sets, rig=rig, profile=resolved.profile,
+        tap=tap,
+    )  # fmt: skip
     held = limited(arm, resolved.profile)
     return LocalStation(
         world=world, loop=loop, perception=perception, arm=held, scenario=scenario, rig=rig,
