@@ -1,7 +1,6 @@
 """A recorder: messages of the topics become chunks of one MCAP file. It holds no clock: who hands a message tells when.
 
-Topics of a kind share chunks (`Lane`), so that who needs decisions alone need not unpack what came every tick. A chunk
-is closed when it is a second old by its messages' own times, or large: in lock-step the same run makes the same bytes.
+Topics of a kind share chunks (`Lane`), so that who needs decisions alone need not unpack what came every tick.
 """
 
 from collections.abc import Callable, Iterable, Mapping
@@ -9,47 +8,26 @@ from typing import Any
 
 import msgspec
 
-from robot.bus.codec import Codec
+from robot.bus.codec import Codec, schema_hash
 from robot.bus.topic import Topic
+from robot.recording.chunks import Chunks
 from robot.recording.lanes import Lane
 from robot.recording.mcap_file import Index
-from robot.recording.records import (
-    HEAD_BYTES,
-    MESSAGE_HEAD,
-    AttachedRecord,
-    ChannelRecord,
-    MetadataRecord,
-    Op,
-    SchemaRecord,
-)
+from robot.recording.records import AttachedRecord, ChannelRecord, MetadataRecord, SchemaRecord
 from robot.recording.sink import Sink
 
-__all__ = ["CHUNK_BYTES", "CHUNK_NS", "WORDED", "Recorder"]
+__all__ = ["SCHEMA", "WORDS", "Recorder", "schema_record"]
 
-CHUNK_NS = 1_000_000_000
-CHUNK_BYTES = 1 << 20
-WORDED = {"numbers": "words"}
-"""Metadata of a channel whose messages have numbers that are not finite in words (robot.bus.codec)."""
+SCHEMA, WORDS = "schema", "words"
+"""Keys of a channel's metadata: the hash of its type as the bus has it, and whether its messages have numbers that are
+not finite in words (robot.bus.codec)."""
 
 
 class _Channel:
     """One topic's messages on their way."""
 
-    def __init__(self, number: int, lane: "_Chunk") -> None:
+    def __init__(self, number: int, lane: Lane) -> None:
         self.number, self.lane, self.n = number, lane, 0
-
-
-class _Chunk:
-    """Messages that are not written yet."""
-
-    def __init__(self) -> None:
-        self.clear()
-
-    def clear(self) -> None:
-        """Begin anew."""
-        self.parts: list[bytes] = []
-        self.index: Index = {}
-        self.size = self.begun_ns = self.n = 0
 
 
 class Recorder:
@@ -59,21 +37,23 @@ class Recorder:
         sink: where chunks go.
         tell: is told once in words when something is lost.
         lanes: which topics share chunks, by a topic's name; DECISIONS where it is not named.
+
+    Attributes:
+        n_lost: Messages that the disk was too slow for, or gone.
     """
 
     def __init__(
         self, sink: Sink, *, lanes: Mapping[str, Lane], tell: Callable[[str], object] = lambda _: None
     ) -> None:
         self._sink, self._tell, self._lane_of = sink, tell, lanes
-        self._chunks = {lane: _Chunk() for lane in Lane}
+        self._chunks = Chunks(self._hand_over)
         self._channels: dict[tuple[str, bool], _Channel] = {}
+        """By topic, and whether numbers are in words."""
         self._codecs: dict[type, Codec[Any]] = {}
         self._schemas: dict[type, int] = {}
-        self._n_channels = 0
         self._encode = msgspec.json.Encoder().encode
         self._is_told = False
         self.n_lost = 0
-        """Messages that the disk was too slow for, or gone."""
 
     def prepare(self, topics: Iterable[Topic[Any]]) -> None:
         """Write which topics there may be, so that none is opened while a tick waits."""
@@ -109,29 +89,12 @@ class Recorder:
     def put(self, topic: Topic[Any], payload: bytes, *, log_ns: int, stamp_ns: int, has_words: bool = False) -> None:
         """Record a message as its bytes."""
         channel = self._channels.get((topic.name, has_words)) or self._open(topic, has_words=has_words)
-        chunk = channel.lane
-        if not chunk.n:
-            chunk.begun_ns = log_ns
-        elif log_ns - chunk.begun_ns >= CHUNK_NS or chunk.size > CHUNK_BYTES:
-            self._close_chunk(chunk)
-            chunk.begun_ns = log_ns
-        number = channel.number
-        length = MESSAGE_HEAD.size - HEAD_BYTES + len(payload)
-        head = MESSAGE_HEAD.pack(Op.MESSAGE, length, number, channel.n & 0xFFFFFFFF, log_ns, stamp_ns)
-        places = chunk.index.get(number)
-        if places is None:
-            places = chunk.index[number] = []
-        places += (log_ns, chunk.size)
-        chunk.parts += (head, payload)
-        chunk.size += MESSAGE_HEAD.size + len(payload)
-        chunk.n += 1
+        self._chunks.add(channel.lane, channel.number, channel.n, log_ns, stamp_ns, payload)
         channel.n += 1
 
     def flush(self) -> None:
         """Hand over what waits, however little."""
-        for chunk in self._chunks.values():
-            if chunk.n:
-                self._close_chunk(chunk)
+        self._chunks.flush()
 
     def close(self) -> None:
         """Finish the file. Idempotent."""
@@ -139,9 +102,7 @@ class Recorder:
         self._sink.close()
         self._say_if_lost()
 
-    def _close_chunk(self, chunk: _Chunk) -> None:
-        records, index, n = b"".join(chunk.parts), chunk.index, chunk.n
-        chunk.clear()
+    def _hand_over(self, records: bytes, index: Index, n: int) -> None:
         if not self._sink.put(lambda file: file.add_chunk(records, index)):
             self.n_lost += n
         self._say_if_lost()
@@ -151,16 +112,15 @@ class Recorder:
         if self._is_told or (why is None and not self.n_lost):
             return
         self._is_told = True
-        slow = f"{self._sink.path}: the disk is too slow, messages are left out; how many, the session's end tells"
-        self._tell(why or slow)
+        self._tell(why or f"{self._sink.path}: the disk is too slow: messages are left out, and nothing waits for it")
 
     def _open(self, topic: Topic[Any], *, has_words: bool) -> _Channel:
-        self._n_channels += 1
-        schema = self._schema(topic.kind)
-        record = ChannelRecord(self._n_channels, schema, topic.name, "json", dict(WORDED) if has_words else {})
+        number = len(self._channels) + 1
+        about = {SCHEMA: schema_hash(topic.kind).hex()} | ({WORDS: "yes"} if has_words else {})
+        record = ChannelRecord(number, self._schema(topic.kind), topic.name, "json", about)
         self._sink.put_surely(lambda file: file.add_channel(record))
-        lane = self._chunks[self._lane_of.get(topic.name, Lane.DECISIONS)]
-        channel = self._channels[topic.name, has_words] = _Channel(self._n_channels, lane)
+        channel = _Channel(number, self._lane_of.get(topic.name, Lane.DECISIONS))
+        self._channels[topic.name, has_words] = channel
         return channel
 
     def _schema(self, kind: type[msgspec.Struct]) -> int:

@@ -10,13 +10,14 @@ from enum import IntEnum
 from struct import Struct as Form
 from struct import pack
 from typing import NamedTuple
+from zlib import crc32
 
 from robot.recording.errors import DamagedError
 
 __all__ = [
     "HEAD_BYTES", "MAGIC", "MESSAGE_HEAD", "AttachedRecord", "AttachmentIndexed", "ChannelRecord", "ChunkIndexed",
     "ChunkRecord", "Cursor", "FooterRecord", "MetadataIndexed", "MetadataRecord", "Op", "SchemaRecord", "Statistics",
-    "messages_of", "record", "strings",
+    "messages_of", "parts_of", "record", "strings", "text",
 ]  # fmt: skip
 
 MAGIC = b"\x89MCAP0\r\n"
@@ -227,8 +228,6 @@ class AttachedRecord(NamedTuple):
 
     def bytes(self) -> bytes:
         """Return it as a record."""
-        from zlib import crc32
-
         body = pack("<QQ", self.log_ns, self.create_ns) + text(self.name) + text(self.media_type)
         body += pack("<Q", len(self.content)) + self.content
         return record(Op.ATTACHMENT, body + pack("<I", crc32(body)))
@@ -236,8 +235,6 @@ class AttachedRecord(NamedTuple):
     @staticmethod
     def read(c: Cursor) -> "AttachedRecord":
         """Return it from its body."""
-        from zlib import crc32
-
         begin = c.at
         found = AttachedRecord(c.whole(8), c.whole(8), c.text(), c.text(), c.take(c.whole(8)))
         expected = crc32(c.raw[begin : c.at])
@@ -348,21 +345,32 @@ class FooterRecord(NamedTuple):
         return FooterRecord(c.whole(8), c.whole(8), c.whole(4))
 
 
+def parts_of(raw: bytes) -> Iterator[tuple[int, int, int]]:
+    """Yield of every record of a chunk what it is, and where its body begins and ends.
+
+    Raises:
+        DamagedError: a record reaches beyond the end.
+    """
+    at, end = 0, len(raw)
+    while at < end:
+        if end - at < HEAD_BYTES:
+            raise DamagedError(f"expected a record in a chunk, {end - at} bytes are left")
+        op, length = _HEAD.unpack_from(raw, at)
+        begin = at + HEAD_BYTES
+        at = begin + length
+        if at > end or (op == Op.MESSAGE and length < _BODY_HEAD):
+            raise DamagedError(f"a record of {length} bytes in a chunk: expected one that ends within it")
+        yield op, begin, at
+
+
 def messages_of(raw: bytes) -> Iterator[tuple[int, int, int, int, bytes]]:
     """Yield channel, how many-th, log time, publish time and payload of every message in a chunk's records.
 
     Raises:
         DamagedError: a record reaches beyond the end.
     """
-    at, end, head = 0, len(raw), MESSAGE_HEAD.unpack_from
-    while at < end:
-        if end - at < HEAD_BYTES:
-            raise DamagedError(f"expected a record in a chunk, {end - at} bytes are left")
-        op, length = _HEAD.unpack_from(raw, at)
-        after = at + HEAD_BYTES + length
-        if after > end or (op == Op.MESSAGE and length < _BODY_HEAD):
-            raise DamagedError(f"a record of {length} bytes in a chunk: expected one that ends within it")
+    head = MESSAGE_HEAD.unpack_from
+    for op, begin, after in parts_of(raw):
         if op == Op.MESSAGE:
-            _, _, channel, sequence, log_ns, publish_ns = head(raw, at)
-            yield channel, sequence, log_ns, publish_ns, raw[at + MESSAGE_HEAD.size : after]
-        at = after
+            _, _, channel, sequence, log_ns, publish_ns = head(raw, begin - HEAD_BYTES)
+            yield channel, sequence, log_ns, publish_ns, raw[begin + _BODY_HEAD : after]

@@ -5,6 +5,7 @@ like a chunk or a beginning: there is one a second, at the latest.
 """
 
 from collections.abc import Iterator
+from mmap import mmap
 from struct import unpack_from
 from typing import NamedTuple
 
@@ -69,7 +70,7 @@ class Loose(NamedTuple):
 Found = Begun | Ended | Gap | Unpacked | Loose | SchemaRecord | ChannelRecord | AttachedRecord | MetadataRecord
 
 
-def scan(raw: bytes | memoryview) -> Iterator[Found]:
+def scan(raw: bytes | mmap) -> Iterator[Found]:
     """Yield what is in a file, from its first byte to its last, summaries left out."""
     at, end, view = 0, len(raw), memoryview(raw)
     is_summary = False
@@ -122,10 +123,9 @@ def _found(view: memoryview, op: int, begin: int, after: int, at: int) -> Found 
     return None if kind is None else kind.read(cursor)
 
 
-def _resume(raw: bytes | memoryview, at: int) -> int:
+def _resume(raw: bytes | mmap, at: int) -> int:
     """Return where the next chunk may begin, or another file; the end where nothing does."""
-    whole = raw if isinstance(raw, bytes) else raw.obj
-    find = getattr(whole, "find", None) or bytes(raw).find
+    find = raw.find
     places = [len(raw)]
     magic = find(MAGIC, at)
     if magic >= 0:

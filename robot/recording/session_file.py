@@ -13,10 +13,11 @@ from zlib import crc32
 
 import msgspec
 
-from robot.bus.codec import Codec
+from robot.bus.codec import Codec, schema_hash
 from robot.bus.topic import Topic
 from robot.recording.compression import unpack_chunk
 from robot.recording.errors import DamagedError, UnfitError
+from robot.recording.recorder import SCHEMA, WORDS
 from robot.recording.records import (
     HEAD_BYTES,
     MAGIC,
@@ -34,7 +35,6 @@ from robot.recording.records import (
     Statistics,
     messages_of,
 )
-from robot.recording.recorder import WORDED
 
 __all__ = ["Raw", "SessionFile"]
 
@@ -153,14 +153,21 @@ class SessionFile:
         """
         by_name = {topic.name: (topic, Codec(topic.kind)) for topic in topics}
         by_channel = {
-            n: (*by_name[c.topic], c.metadata == WORDED) for n, c in self.channels.items() if c.topic in by_name
+            n: (*by_name[c.topic], WORDS in c.metadata) for n, c in self.channels.items() if c.topic in by_name
         }
         for raw in self.raw(by_name):
             topic, codec, has_words = by_channel[raw.channel]
             try:
                 yield topic, raw, codec.decode(raw.payload, b"", has_words=has_words)
             except ValueError as error:
-                raise DamagedError(f"{self.path}: {topic.name} at {raw.log_ns} ns: {error}") from error
+                where = f"{self.path}: {topic.name} at {raw.log_ns} ns: {error}"
+                if self.is_drifted(raw.channel, topic):
+                    raise UnfitError(f"{where}; it was recorded by a version with another type") from error
+                raise DamagedError(where) from error
+
+    def is_drifted(self, channel: int, topic: Topic[Any]) -> bool:
+        """Whether a channel was written with a type that is another here."""
+        return self.channels[channel].metadata.get(SCHEMA) != schema_hash(topic.kind).hex()
 
     def _records(self, chunk: ChunkIndexed) -> bytes:
         try:
