@@ -68,6 +68,9 @@ def learn(
     workers: Annotated[int | None, typer.Option(min=0, help="Evaluation processes beside this one.")] = None,
     record_to: RecordTo = None,
     person: Person = "unnamed",
+    replay: Annotated[
+        Path | None, typer.Option(help="No run: let the learner live through this session again, and compare.")
+    ] = None,
     *,
     record: Record = False,
     resume: Annotated[
@@ -82,6 +85,9 @@ def learn(
     a second one stops at once. --resume goes on: in lock-step bit for bit, by the wall clock (rigs with an address)
     from the same learnt state.
     """
+    if replay is not None:
+        _replay(replay, json=json)
+        return
     from learning.session import open_session  # brings torch, seconds that reports do not need
 
     wanted = Wanted(scenario=scenario, rig=rig, preset=preset, seed=seed, epochs=epochs, judged=judged)
@@ -105,6 +111,21 @@ def learn(
         typer.echo(msgspec.json.encode(run.summary).decode())
     else:
         _tell(run, ended)
+
+
+def _replay(path: Path, *, json: bool) -> None:
+    """Replay a session into the learner; exit code 1 where it does not come to the same."""
+    from learning.replaying import replay_to_learning  # brings torch
+
+    with Status("replaying", now_s=perf_counter) as status:
+        replayed, _ = replay_to_learning(path, tell=lambda n_done: status(f"replayed up to epoch {n_done}"))
+    if json:
+        typer.echo(msgspec.json.encode(replayed.told()).decode())
+    else:
+        for line in replayed.lines():
+            typer.echo(line)
+    if not replayed.is_identical:
+        raise typer.Exit(EXIT_FAILED)
 
 
 def _tell_loss(why: str) -> None:

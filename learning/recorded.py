@@ -1,27 +1,27 @@
 """What a learner decides and what becomes of it, on its way into a session."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 from learning.agent import Agent, EpochRecord, TrialRecord
 from learning.fingerprint import fingerprint
 from robot.recording.messages import EpochOutcome, GoalChosen, Kept, SubgoalChosen, TrialEvidence
-from robot.recording.recorder import Recorder
+from robot.recording.recording import Recording
 from robot.recording.topics import EPOCH, EVIDENCE, GOAL, KEPT, SUBGOAL
 
 __all__ = ["RecordedDecisions"]
 
 
 class RecordedDecisions:
-    """Implements learning.agent.Witness for a recorder.
+    """Implements learning.agent.Witness for a recording.
 
     Args:
-        recorder: takes it.
+        recording: takes it.
         names: of the goals.
-        at_ns: the session's time.
     """
 
-    def __init__(self, recorder: Recorder, names: Sequence[str], at_ns: Callable[[], int]) -> None:
-        self._recorder, self._names, self._at_ns = recorder, tuple(names), at_ns
+    def __init__(self, recording: Recording, names: Sequence[str]) -> None:
+        self._recording, self._names = recording, tuple(names)
+        self._recorder, self._at_ns = recording.recorder, recording.at_ns
 
     def epoch_begun(self, epoch: int, goal: int) -> None:
         """Record the goal."""
@@ -65,5 +65,5 @@ class RecordedDecisions:
 
     def captured(self, n_done: int, agent: Agent) -> None:
         """Record a fingerprint of everything learnt."""
-        kept = Kept(n_done=n_done, sha256=fingerprint(agent.state_dict()))
+        kept = Kept(n_done=n_done, sha256=fingerprint(agent.state_dict()), heard=self._recording.heard.hexdigest())
         self._recorder.write(KEPT, kept, log_ns=self._at_ns())

@@ -116,7 +116,7 @@ class Session:
         if self._recording is None:
             return None
         names = [goal.name for goal in self.manifest.goals]
-        heard = RecordedDecisions(self._recording.recorder, names, self._recording.at_ns)
+        heard = RecordedDecisions(self._recording, names)
         self._learner.agent.witness = heard
         return heard
 

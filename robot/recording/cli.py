@@ -17,10 +17,14 @@ from robot.recording.errors import DamagedError
 from robot.recording.recovering import recover as recover_session
 from robot.recording.session_file import SessionFile
 from robot.recording.telling import about_session
+from robot.rigs import load
+from robot.stdio import STDERR, redirected_stdout
 
 __all__ = ["app"]
 
 EXIT_FAILED = 1
+REPLAYERS = {"learning": "learning.replaying:replay_session", "twin": "robot.recording.replay_to_arm:replay_to_arm"}
+"""Who replays a session; learning is not known here."""
 MOST_LOST = 10
 
 app = typer.Typer(
@@ -124,6 +128,33 @@ def merge(
     """Write several sessions into one by their times; what lies in two of them is written once."""
     n = merge_sessions(sessions, out)
     typer.echo(f"{out}: {n} messages")
+
+
+@app.command()
+def replay(
+    session: Session,
+    *,
+    to: Annotated[str, typer.Option(help="learning, or twin.")] = "learning",
+    rig: Annotated[
+        str | None, typer.Option(help="For twin: a shipped rig or a file; the session's own if left out.")
+    ] = None,
+    json: Json = False,
+) -> None:
+    """Let the learner, or the twin, live through a session again; exit code 1 if it does not come to the same."""
+    if to not in REPLAYERS:
+        raise typer.BadParameter(f"expected {' or '.join(REPLAYERS)}, got {to!r}", param_hint="--to")
+    if to != "twin" and rig is not None:
+        raise typer.BadParameter("expected --to twin beside it", param_hint="--rig")
+    with redirected_stdout(STDERR):
+        replayer = load(REPLAYERS[to])
+        done = replayer(session) if rig is None else replayer(session, rig=rig)
+    if json:
+        typer.echo(msgspec.json.encode(done.told()).decode())
+    else:
+        for line in done.lines():
+            typer.echo(line)
+    if not done.is_same:
+        raise typer.Exit(EXIT_FAILED)
 
 
 def _epochs(text: str) -> tuple[int, int]:

@@ -110,6 +110,8 @@ class Kept(msgspec.Struct, frozen=True, kw_only=True):
 
     n_done: int
     sha256: str
+    heard: str = ""
+    """Digest of all percepts and outcomes that were learnt from, byte for byte: more than the learner may notice."""
 
 
 class Event(msgspec.Struct, frozen=True, kw_only=True):

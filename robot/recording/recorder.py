@@ -69,8 +69,8 @@ class Recorder:
         kept = MetadataRecord(name, dict(values))
         self._sink.put_surely(lambda file: file.add_metadata(kept))
 
-    def write(self, topic: Topic[Any], message: msgspec.Struct, *, log_ns: int, stamp_ns: int | None = None) -> None:
-        """Record a message.
+    def write(self, topic: Topic[Any], message: msgspec.Struct, *, log_ns: int, stamp_ns: int | None = None) -> bytes:
+        """Record a message, and return its payload.
 
         Args:
             topic: which.
@@ -81,6 +81,7 @@ class Recorder:
         payload, beside, has_words = self._codec(topic.kind).encode(message)
         assert not beside, f"{topic.name}: messages with a field of bytes are not recorded as they are"
         self.put(topic, payload, log_ns=log_ns, stamp_ns=log_ns if stamp_ns is None else stamp_ns, has_words=has_words)
+        return payload
 
     def encoded(self, message: msgspec.Struct) -> bytes:
         """Return the payload of a message whose numbers are known to be finite, as those are that passed the gate."""

@@ -6,6 +6,7 @@ wire times are the host's monotonic clock, and the metadata say what the wall's 
 
 from collections.abc import Callable, Mapping
 from datetime import UTC, datetime
+from hashlib import sha256
 from importlib.metadata import version
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -49,6 +50,7 @@ class Recording:
     Attributes:
         recorder: Takes more.
         ticks: Listens to a tick loop in this process.
+        heard: Digest of the percepts and outcomes of epochs that are for what the recording is for.
     """
 
     def __init__(
@@ -73,13 +75,16 @@ class Recording:
         self._attach(attached or {})
         self.recorder.prepare(RECORDED)
         self._is_begun = False
+        self.heard = sha256()
 
     def station(self, station: Station, *, purpose: Purpose | None = None, is_driven: bool = False) -> RecordedStation:
         """Return a station that is recorded; the first one's spec goes into the file."""
         resolved = self._resolved
+        is_own = purpose in (None, self._purpose)
         heard = RecordedStation(
             station, self.recorder, purpose=purpose or self._purpose, ticks=self.ticks,
             picture=Picture(resolved.arm, resolved.scenario), now_ns=self._now_ns,
+            heard=self.heard if is_own else None,
         )  # fmt: skip
         if not self._is_begun:
             self._is_begun = True

@@ -1,6 +1,8 @@
 """What listens to a tick loop and to a station, and hands what it hears to a recorder. Nothing of it comes back."""
 
 from collections.abc import Callable
+from hashlib import sha256
+from typing import Protocol
 
 from robot.as_came import as_came
 from robot.bus.topics import ARM_STATE, PERCEPT, REQUESTED, SENT, VERDICT
@@ -22,10 +24,22 @@ from robot.recording.recorder import Recorder
 from robot.recording.topics import EVENT, INTENT, RESET_MARK, SCENE, STATION, STEP, TF
 from robot.station import Station
 
-__all__ = ["Now", "RecordedStation", "RecordedTicks"]
+__all__ = ["Heard", "Now", "RecordedStation", "RecordedTicks"]
 
 Now = Callable[[], int]
 """The session's clock."""
+
+
+class Heard(Protocol):
+    """A digest in the making, as hashlib has them."""
+
+    def update(self, data: bytes, /) -> None:
+        """Take bytes in."""
+        ...
+
+    def hexdigest(self) -> str:
+        """Return it so far."""
+        ...
 
 
 class RecordedTicks:
@@ -86,6 +100,7 @@ class RecordedStation:
         ticks: tells the newest measurement; None where ticks are not heard here.
         picture: draws for viewers; None leaves that out.
         now_ns: the session's time; None is the percepts' own.
+        heard: takes percepts and outcomes into a digest.
     """
 
     def __init__(
@@ -97,7 +112,9 @@ class RecordedStation:
         ticks: RecordedTicks | None = None,
         picture: Picture | None = None,
         now_ns: Now | None = None,
+        heard: Heard | None = None,
     ) -> None:
+        self._heard: Heard = heard or sha256()
         self._station, self._recorder, self._purpose = station, recorder, purpose
         self._ticks, self._picture, self._now_ns = ticks, picture, now_ns
         self._at_ns = 0
@@ -139,7 +156,7 @@ class RecordedStation:
             raise
         self._perceived(result.percept)
         mark = StepMark(executed=result.executed, verdicts=result.verdicts, is_void=result.is_void)
-        self._recorder.write(STEP, mark, log_ns=self._at_ns)
+        self._heard.update(self._recorder.write(STEP, mark, log_ns=self._at_ns))
         if result.is_void:
             state = self.state
             self._happened(f"void, station {state.mode}", state.reason)
@@ -151,7 +168,7 @@ class RecordedStation:
 
     def _perceived(self, percept: Percept) -> None:
         at = self._time(percept)
-        self._recorder.write(PERCEPT, percept, log_ns=at, stamp_ns=percept.stamp_ns)
+        self._heard.update(self._recorder.write(PERCEPT, percept, log_ns=at, stamp_ns=percept.stamp_ns))
         if self._picture is None:
             return
         frames = self._picture.frames(None if self._ticks is None else self._ticks.state, percept)
