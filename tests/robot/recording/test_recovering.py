@@ -1,4 +1,4 @@
-"""Torn, changed and concatenated files: what is whole is saved, and every reader opens it; the rest is told in words."""
+"""Torn, changed and concatenated files: what is whole is saved, every reader opens it; the rest is told in words."""
 
 import os
 import signal
@@ -42,8 +42,7 @@ def saved(raw, folder, name="saved.mcap"):
     out.unlink(missing_ok=True)
     try:
         told = recover(path, out)
-    except SessionError as error:
-        assert str(error)
+    except SessionError:
         assert not out.exists()
         return None
     assert n_messages(out) == told.n_messages
