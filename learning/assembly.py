@@ -15,7 +15,7 @@ from learning.seeds import named_generator
 from learning.stops import Stops, stops_of
 from learning.stopwatch import Stopwatch
 from learning.subgoal_selector import make_subgoal_selector
-from robot.messages import PlantIdentity, StationSpec
+from robot.messages import ArmState, PlantIdentity, StationSpec
 from robot.operated import OperatedStation
 from robot.rigs import build_operator, build_station
 from robot.tick_tap import TickTap
@@ -59,6 +59,10 @@ class RobotLearner:
     def stops(self) -> Stops:
         """What stopped the arm so far."""
         return stops_of(self._local.latch_reasons, n_epochs=self.station.n_resets)
+
+    def measured(self) -> ArmState:
+        """Return the newest measurement."""
+        return self._local.measured
 
     def close(self) -> None:
         """Release the station. Idempotent."""

@@ -163,7 +163,10 @@ def evaluate(
         int | None, typer.Option(min=0, help="Epoch whose rules are in force.  [default: the last one learnt]")
     ] = None,
     rig: Annotated[str | None, typer.Option(help="Shipped rig or a file to test on.  [default: the run's]")] = None,
+    record_to: RecordTo = None,
+    person: Person = "unnamed",
     *,
+    record: Record = False,
     json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
 ) -> None:
     """Test what a run's newest checkpoint holds: learning off, fresh table layouts, every goal."""
@@ -172,7 +175,10 @@ def evaluate(
     folder = RunFolder(run)
     goals = [goal.name for goal in folder.manifest().goals]
     with Status(f"testing {len(goals)} goals, {tests} epochs each", now_s=perf_counter) as status:
-        assessed = assess(folder, n_tests=tests, seed=seed, rules_epoch=rules_epoch, rig=rig, tell=status)
+        assessed = assess(
+            folder, n_tests=tests, seed=seed, rules_epoch=rules_epoch, rig=rig, tell=status,
+            record=RecordWanted.of(record_to, is_asked=record, person=person, tell=_tell_loss),
+        )  # fmt: skip
     rows, stops = assessed.rows, assessed.stops
     if json:
         typer.echo(msgspec.json.encode({"goals": goals, "rows": rows, "stops": stops.as_tree()}).decode())

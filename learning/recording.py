@@ -53,7 +53,7 @@ def open_recording(
     """
     n_done = 0 if state is None else state["n_done"]
     return Recording(
-        wanted.path or _free(folder.path, n_done),
+        wanted.path or _free(folder.path, n_done, purpose),
         resolved,
         purpose=purpose,
         seed=seed,
@@ -64,9 +64,9 @@ def open_recording(
     )
 
 
-def _free(folder: Path, n_done: int) -> Path:
+def _free(folder: Path, n_done: int, purpose: Purpose) -> Path:
     """Return a name that no file has: what was recorded before a crash is kept beside."""
-    stem, n = f"session-{n_done:08d}", 1
+    stem, n = f"{'session' if purpose is Purpose.LEARN else purpose.value}-{n_done:08d}", 1
     path = folder / f"{stem}{SESSION_SUFFIX}"
     while path.exists():
         n += 1

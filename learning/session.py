@@ -109,7 +109,9 @@ class Session:
 
     def _station(self, purpose: Purpose) -> Station:
         station = self._learner.station
-        return station if self._recording is None else self._recording.station(station, purpose=purpose)
+        if self._recording is None:
+            return station
+        return self._recording.station(station, purpose=purpose, measure=self._learner.measured)
 
     def _heard(self) -> RecordedDecisions | None:
         """Let the agent's decisions be recorded, where a run is."""

@@ -17,14 +17,16 @@ import msgspec
 from config.resolved import Resolved, dump_resolved
 from robot.bench import bench_report
 from robot.description import write_mjcf
+from robot.messages import ArmState
 from robot.recording.messages import Purpose
 from robot.recording.picture import Picture
 from robot.recording.recorder import Recorder
 from robot.recording.sink import Sink
-from robot.recording.taps import RecordedStation, RecordedTicks
+from robot.recording.taps import RecordedDrive, RecordedStation, RecordedTicks
 from robot.recording.topics import LANES, RECORDED
 from robot.revision import git_revision
 from robot.station import Station
+from robot.teleop.driver import DrivenStation
 
 __all__ = ["CONFIG", "FORMAT", "STATE", "UNNAMED", "Recording"]
 
@@ -77,18 +79,36 @@ class Recording:
         self._is_begun = False
         self.heard = sha256()
 
-    def station(self, station: Station, *, purpose: Purpose | None = None, is_driven: bool = False) -> RecordedStation:
-        """Return a station that is recorded; the first one's spec goes into the file."""
+    def station(
+        self, station: Station, *, purpose: Purpose | None = None, measure: Callable[[], ArmState] | None = None
+    ) -> RecordedStation:
+        """Return a station that is recorded; the first one's spec goes into the file.
+
+        Args:
+            station: what is recorded.
+            purpose: what its epochs are for; the recording's own if left out.
+            measure: returns the newest measurement, needed where ticks are not heard in this process.
+        """
         resolved = self._resolved
         is_own = purpose in (None, self._purpose)
         heard = RecordedStation(
             station, self.recorder, purpose=purpose or self._purpose, ticks=self.ticks,
             picture=Picture(resolved.arm, resolved.scenario), now_ns=self._now_ns,
-            heard=self.heard if is_own else None,
+            heard=self.heard if is_own else None, measure=None if self._now_ns is None else measure,
         )  # fmt: skip
         if not self._is_begun:
             self._is_begun = True
-            heard.begin(is_driven=is_driven)
+            heard.begin(is_driven=False)
+        return heard
+
+    def drive(self, station: DrivenStation) -> RecordedDrive:
+        """Return a driven station that is recorded."""
+        resolved = self._resolved
+        heard = RecordedDrive(
+            station, self.recorder, ticks=self.ticks, picture=Picture(resolved.arm, resolved.scenario),
+            now_ns=self._now_ns, measure=None if self._now_ns is None else lambda: station.measured,
+        )  # fmt: skip
+        heard.begin(is_driven=True)
         return heard
 
     def at_ns(self) -> int:

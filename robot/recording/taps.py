@@ -23,8 +23,9 @@ from robot.recording.picture import Picture
 from robot.recording.recorder import Recorder
 from robot.recording.topics import EVENT, INTENT, RESET_MARK, SCENE, STATION, STEP, TF
 from robot.station import Station
+from robot.teleop.driver import DrivenStation
 
-__all__ = ["Heard", "Now", "RecordedStation", "RecordedTicks"]
+__all__ = ["Heard", "Now", "RecordedDrive", "RecordedStation", "RecordedTicks"]
 
 Now = Callable[[], int]
 """The session's clock."""
@@ -101,6 +102,8 @@ class RecordedStation:
         picture: draws for viewers; None leaves that out.
         now_ns: the session's time; None is the percepts' own.
         heard: takes percepts and outcomes into a digest.
+        measure: returns the newest measurement, where ticks are not heard here: it is recorded with every step, and so
+            is the command that was sent last.
     """
 
     def __init__(
@@ -113,7 +116,9 @@ class RecordedStation:
         picture: Picture | None = None,
         now_ns: Now | None = None,
         heard: Heard | None = None,
+        measure: Callable[[], ArmState] | None = None,
     ) -> None:
+        self._measure = measure
         self._heard: Heard = heard or sha256()
         self._station, self._recorder, self._purpose = station, recorder, purpose
         self._ticks, self._picture, self._now_ns = ticks, picture, now_ns
@@ -155,6 +160,8 @@ class RecordedStation:
             self._happened("step failed", str(error))
             raise
         self._perceived(result.percept)
+        if self._measure is not None and result.executed.sent is not None:
+            self._recorder.write(SENT, result.executed.sent, log_ns=self._at_ns, stamp_ns=result.executed.sent.stamp_ns)
         mark = StepMark(executed=result.executed, verdicts=result.verdicts, is_void=result.is_void)
         self._heard.update(self._recorder.write(STEP, mark, log_ns=self._at_ns))
         if result.is_void:
@@ -169,9 +176,13 @@ class RecordedStation:
     def _perceived(self, percept: Percept) -> None:
         at = self._time(percept)
         self._heard.update(self._recorder.write(PERCEPT, percept, log_ns=at, stamp_ns=percept.stamp_ns))
+        state = None if self._ticks is None else self._ticks.state
+        if self._measure is not None:
+            state = self._measure()
+            self._recorder.write(ARM_STATE, state, log_ns=at, stamp_ns=state.stamp_ns)
         if self._picture is None:
             return
-        frames = self._picture.frames(None if self._ticks is None else self._ticks.state, percept)
+        frames = self._picture.frames(state, percept)
         self._recorder.write(TF, frames, log_ns=at, stamp_ns=percept.stamp_ns)
         scene = self._picture.scene(percept)
         if scene is not None:
@@ -188,3 +199,32 @@ class RecordedStation:
             at = max(0 if percept is None else percept.stamp_ns, 0 if self._ticks is None else self._ticks.log_ns)
         self._at_ns = max(self._at_ns, at)
         return self._at_ns
+
+
+class RecordedDrive(RecordedStation):
+    """A recorded station that a driver holds: it tells what its arm measured, too."""
+
+    def __init__(
+        self,
+        station: DrivenStation,
+        recorder: Recorder,
+        *,
+        ticks: RecordedTicks,
+        picture: Picture,
+        now_ns: Now | None,
+        measure: Callable[[], ArmState] | None,
+    ) -> None:
+        super().__init__(
+            station, recorder, purpose=Purpose.DRIVE, ticks=ticks, picture=picture, now_ns=now_ns, measure=measure
+        )
+        self._driven = station
+
+    @property
+    def measured(self) -> ArmState:
+        """The newest measurement."""
+        return self._driven.measured
+
+    @property
+    def percept(self) -> Percept:
+        """What was perceived last."""
+        return self._driven.percept
