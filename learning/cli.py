@@ -71,6 +71,9 @@ def learn(
     replay: Annotated[
         Path | None, typer.Option(help="No run: let the learner live through this session again, and compare.")
     ] = None,
+    taught_by: Annotated[
+        list[Path] | None, typer.Option("--from", help="Show this session to a new learner first; more than once.")
+    ] = None,
     *,
     record: Record = False,
     resume: Annotated[
@@ -98,7 +101,8 @@ def learn(
     with folder:
         consent = Consent(folder, workers=workers)
         session = open_session(
-            folder, wanted, resume=resume, stopwatch=stopwatch, consent=consent, record=recorded
+            folder, wanted, resume=resume, stopwatch=stopwatch, consent=consent, record=recorded,
+            taught_by=taught_by or (),
         )  # fmt: skip
         try:
             ended = _run(session, folder, console, consent.n_workers)

@@ -1,18 +1,22 @@
 """One session of a run: begin it or take it up again, learn, and leave a folder that tells all."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import Any
 
 from config.resolved import Resolved, dump_resolved
 from learning.assembly import RobotLearner, build_agent, learner_maker
+from learning.checkpoint import encode
 from learning.ended import Ended
 from learning.evaluation_pool import EvaluationPool
 from learning.experiment import Experiment, Plan
+from learning.experts import ExpertSet
+from learning.offline import teach
 from learning.progress import Progress
 from learning.provenance import manifest_of
 from learning.recorded import RecordedDecisions
 from learning.recording import RecordWanted, open_recording
-from learning.run_folder import Manifest, RunFolder
+from learning.run_folder import TAUGHT_NAME, Manifest, RunFolder
 from learning.stops import Stops
 from learning.stopwatch import Stopwatch
 from learning.tables import Tables
@@ -20,7 +24,7 @@ from learning.time_spent import TimeSpent
 from learning.wanted import Wanted, refuse_another, resolve_wanted
 from robot.oracle import rules_oracle
 from robot.recording.messages import Purpose
-from robot.recording.recording import Recording
+from robot.recording.recording import STATE, Recording
 from robot.station import Station
 
 __all__ = ["Session", "open_session"]
@@ -54,6 +58,24 @@ class Session:
     def n_done(self) -> int:
         """Epochs done before this session."""
         return 0 if self.state is None else self.state["n_done"]
+
+    def teach(self, paths: Sequence[Path]) -> None:
+        """Show sessions to the learner before it begins, and keep in the folder what it was shown.
+
+        Raises:
+            SessionError: one is torn, or of another scenario, or they show nothing.
+        """
+        learner = self._learner
+        experts = learner.agent.experts
+        assert isinstance(experts, ExpertSet), "build_agent makes one"
+        scenario = self._resolved.scenario.name
+        taught = teach(learner.agent, experts, learner.station.spec, paths, scenario=scenario)
+        self._folder.write_json(TAUGHT_NAME, taught)
+        if self._recording is not None:
+            self._recording.recorder.attach(STATE, "application/zip", encode(learner.agent.state_dict()))
+        names = [goal.name for goal in self.manifest.goals]
+        shown = ", ".join(f"{name} {n}" for name, n in zip(names, taught.ways_by_goal, strict=True))
+        self.remarks.append(f"taught by {taught.n_sessions} sessions, {taught.n_epochs} epochs; ways shown: {shown}")
 
     def run(self, progress: Progress, *, n_workers: int, should_stop: Callable[[], bool]) -> Ended:
         """Learn until all epochs are done or a stop is asked for.
@@ -144,6 +166,7 @@ def open_session(
     stopwatch: Stopwatch,
     consent: Callable[[Resolved, int], None] = lambda _resolved, _n_done: None,
     record: RecordWanted | None = None,
+    taught_by: Sequence[Path] = (),
 ) -> Session:
     """Begin a run in a folder, or read where the run that it holds was left.
 
@@ -155,6 +178,7 @@ def open_session(
         consent: is told what the run is made of and how many epochs are done, before any arm is connected to; raises
             where it shall not go on.
         record: where this session is recorded; None records nothing.
+        taught_by: sessions that a new run's learner is shown before it begins.
 
     Raises:
         ConfigError: a config file is missing or wrong.
@@ -167,6 +191,8 @@ def open_session(
     resolved = resolve_wanted(wanted)
     consent(resolved, 0)
     session = _assemble(folder, resolved, wanted.seed or 0, stopwatch, record)
+    if taught_by:
+        session.teach(taught_by)
     folder.start(session.manifest, dump_resolved(resolved))
     return session
 
