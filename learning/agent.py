@@ -15,7 +15,7 @@ from learning.stopwatch import Stopwatch
 from robot.messages import Heading, Percept
 from robot.station import Station
 
-__all__ = ["Agent", "EpochRecord", "GoalJudge", "GoalSelector", "TrialRecord"]
+__all__ = ["Agent", "EpochRecord", "GoalJudge", "GoalSelector", "TrialRecord", "Witness"]
 
 RETREAT_STEPS = 20
 RISEN_WITHIN_M = 0.012
@@ -63,6 +63,26 @@ class GoalJudge(Protocol):
 
     def is_at_place(self, goal: int, percept: Percept) -> bool:
         """Whether the tool is where the goal should come about, hand free (or full) as it must be."""
+        ...
+
+
+class Witness(Protocol):
+    """Hears what is decided and what becomes of it, for a recording. Nothing of it comes back."""
+
+    def epoch_begun(self, epoch: int, goal: int) -> None:
+        """A goal was chosen."""
+        ...
+
+    def subgoal_chosen(self, *, epoch: int, trial: int, goal: int, subgoal: int) -> None:
+        """A sub-goal was chosen."""
+        ...
+
+    def trial_ended(self, record: "TrialRecord") -> None:
+        """A trial is over."""
+        ...
+
+    def epoch_ended(self, record: "EpochRecord") -> None:
+        """An epoch is over."""
         ...
 
 
@@ -127,6 +147,8 @@ class Agent:
         self._protocol = protocol
         self._stopwatch = stopwatch or Stopwatch()
         self._nothing: GoalState = (False,) * judge.n_goals
+        self.witness: Witness | None = None
+        """Hears of everything."""
 
     @property
     def n_goals(self) -> int:
@@ -141,18 +163,27 @@ class Agent:
 
     def learn_epoch(self, station: Station, *, epoch: int, seed: int, goal: int) -> EpochRecord:
         """Lay the table out and pursue a goal for up to eight trials, learning."""
+        if self.witness is not None:
+            self.witness.epoch_begun(epoch, goal)
         scene = self._reset(station, epoch=epoch, seed=seed)
         predicted = self.experts.utility(goal, scene.percept)
         record = self._run_epoch(station, scene, epoch=epoch, goal=goal, explore=True)
         if not record.is_void:
             self.goal_selector.end_epoch(goal, predicted=predicted, is_achieved=record.is_achieved)
         self._stopwatch.lap("selectors")
+        if self.witness is not None:
+            self.witness.epoch_ended(record)
         return record
 
     def test_epoch(self, station: Station, *, epoch: int, seed: int, goal: int) -> EpochRecord:
         """Pursue a given goal with learning off: nothing is drawn, nothing learnt changes."""
+        if self.witness is not None:
+            self.witness.epoch_begun(epoch, goal)
         scene = self._reset(station, epoch=epoch, seed=seed)
-        return self._run_epoch(station, scene, epoch=epoch, goal=goal, explore=False)
+        record = self._run_epoch(station, scene, epoch=epoch, goal=goal, explore=False)
+        if self.witness is not None:
+            self.witness.epoch_ended(record)
+        return record
 
     def state_dict(self) -> dict[str, Any]:
         """Return everything learnt and the generators' states."""
@@ -184,6 +215,8 @@ class Agent:
                 break
             record = self._run_trial(station, scene, epoch=epoch, goal=goal, trial=len(records) + 1, explore=explore)
             records.append(record)
+            if self.witness is not None:
+                self.witness.trial_ended(record)
             if record.attempt.outcome is TrialOutcome.VOID:
                 break
             if explore:
@@ -208,6 +241,8 @@ class Agent:
         subgoal = self.subgoal_selector.select(
             goal=goal, state=state, available=scene.available(), temperature=temperature, explore=explore
         )
+        if self.witness is not None:
+            self.witness.subgoal_chosen(epoch=epoch, trial=trial, goal=goal, subgoal=subgoal)
         self._stopwatch.lap("selectors")
         predicted = self.experts.utility(subgoal, scene.percept)
         skill = self.experts.skill(subgoal)

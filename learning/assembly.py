@@ -15,9 +15,10 @@ from learning.seeds import named_generator
 from learning.stops import Stops, stops_of
 from learning.stopwatch import Stopwatch
 from learning.subgoal_selector import make_subgoal_selector
-from robot.messages import PlantIdentity, StationSpec
+from robot.messages import ArmState, PlantIdentity, StationSpec
 from robot.operated import OperatedStation
 from robot.rigs import build_operator, find_station
+from robot.tick_tap import TickTap
 
 __all__ = ["RobotLearner", "build_agent", "learner_maker"]
 
@@ -26,7 +27,13 @@ class RobotLearner:
     """An agent and the station it acts through (learning.evaluation.Learner)."""
 
     def __init__(
-        self, resolved: Resolved, *, seed: int, stopwatch: Stopwatch | None = None, pictures: Path = Path("resets")
+        self,
+        resolved: Resolved,
+        *,
+        seed: int,
+        stopwatch: Stopwatch | None = None,
+        pictures: Path = Path("resets"),
+        tap: TickTap | None = None,
     ) -> None:
         """Build plant and station, arm it where nobody has to be there for that, and build the agent.
 
@@ -35,10 +42,12 @@ class RobotLearner:
             seed: root seed of the run.
             stopwatch: hears of every layer's time; None measures nothing.
             pictures: folder for what a person who lays the table out needs to see.
+            tap: hears of every tick, where the arm is held in this process.
         """
         # One small network at a time: more threads cost more than they bring, and the number would change the sums.
         torch.set_num_threads(1)
-        station = find_station(resolved, heard_by=None if stopwatch is None else stopwatch.lap, pictures=pictures)
+        lap = None if stopwatch is None else stopwatch.lap
+        station = find_station(resolved, heard_by=lap, pictures=pictures, tap=tap)
         self._local = station
         self.station = OperatedStation(station, build_operator(resolved.rig))
         self.station.connect()
@@ -50,6 +59,10 @@ class RobotLearner:
     def stops(self) -> Stops:
         """What stopped the arm so far."""
         return stops_of(self._local.latch_reasons, n_epochs=self.station.n_resets)
+
+    def measured(self) -> ArmState:
+        """Return the newest measurement."""
+        return self._local.measured
 
     def close(self) -> None:
         """Release the station. Idempotent."""

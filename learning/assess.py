@@ -5,6 +5,7 @@ from collections.abc import Callable
 import msgspec
 
 from config.loader import with_rig
+from config.resolved import Resolved
 from learning.assembly import RobotLearner
 from learning.checkpoint import taking_up
 from learning.errors import LearningError
@@ -12,10 +13,15 @@ from learning.evaluation import GoalTest, evaluation_row, learnt_graph, run_test
 from learning.explain import Explanation, explain_graph
 from learning.graph import Graph
 from learning.metrics import graph_errors, reachable_states
+from learning.recorded import RecordedDecisions
+from learning.recording import RecordWanted, open_recording
 from learning.rows import EvaluationRow
-from learning.run_folder import RunFolder
+from learning.run_folder import Manifest, RunFolder
 from learning.stops import Stops
 from robot.oracle import rules_oracle
+from robot.recording.messages import Purpose
+from robot.recording.recording import Recording
+from robot.station import Station
 
 __all__ = ["Assessed", "assess", "beliefs_of"]
 
@@ -55,6 +61,7 @@ def assess(
     rules_epoch: int | None,
     rig: str | None = None,
     tell: Callable[[str], object] = lambda _: None,
+    record: RecordWanted | None = None,
 ) -> Assessed:
     """Return a row a goal: learning off, the newest checkpoint, from fresh table layouts.
 
@@ -65,6 +72,7 @@ def assess(
         rules_epoch: epoch whose rules are in force; None takes the last one learnt.
         rig: shipped rig or a file to test on; None takes the run's own.
         tell: told after every test epoch how far it is, in words.
+        record: where it is recorded; None records nothing.
 
     Raises:
         ConfigError: the rig's file is missing or wrong, or it is another arm's.
@@ -88,18 +96,25 @@ def assess(
         )
         for goal in range(n_goals)
     ]
-    learner = RobotLearner(resolved, seed=manifest.seed, pictures=folder.path / "resets")
+    recording = None
+    if record is not None:
+        recording = open_recording(
+            record, folder, resolved, seed=tests[0].root_seed, state=state, purpose=Purpose.TEST
+        )  # fmt: skip
+    learner, station = _recorded_learner(folder, resolved, manifest, recording)
     try:
         with taking_up():
             learner.agent.load_state_dict(state["agent"])
         scores = []
         for test in tests:
             heard = _Count(f"{manifest.goals[test.goal].name}, goal {test.goal + 1} of {n_goals}", tell)
-            scores.append(run_test(learner.agent, learner.station, test, when_tested=heard))
+            scores.append(run_test(learner.agent, station, test, when_tested=heard))
         predicted = learnt_graph(learner.agent)
     finally:
         stops = learner.stops
         learner.close()
+        if recording is not None:
+            recording.close()
     graph: list[tuple[int, int] | None] = [None] * n_goals
     if predicted is not None:
         states = reachable_states(lambda goal, latched: oracle(goal, latched, epoch), n_goals)
@@ -107,6 +122,18 @@ def assess(
         graph = [(len(states), n) for n in wrong]
     rows = tuple(evaluation_row(test, score, entry) for test, score, entry in zip(tests, scores, graph, strict=True))
     return Assessed(rows=rows, stops=stops)
+
+
+def _recorded_learner(
+    folder: RunFolder, resolved: Resolved, manifest: Manifest, recording: Recording | None
+) -> tuple[RobotLearner, Station]:
+    """Return a learner and the station that it is tested on, recorded where that is wanted."""
+    tap = None if recording is None else recording.ticks
+    learner = RobotLearner(resolved, seed=manifest.seed, pictures=folder.path / "resets", tap=tap)
+    if recording is None:
+        return learner, learner.station
+    learner.agent.witness = RecordedDecisions(recording, [goal.name for goal in manifest.goals])
+    return learner, recording.station(learner.station, measure=learner.measured)
 
 
 class _Count:

@@ -16,6 +16,7 @@ from learning.ended import Ended
 from learning.errors import LearningError, RunFolderError
 from learning.figures import curriculum_figure, performance_figure, save
 from learning.progress import Progress, Status
+from learning.recording import RecordWanted
 from learning.report import Run, group_runs, load_run, load_runs, report_of
 from learning.run_folder import RunFolder
 from learning.stopwatch import Stopwatch
@@ -33,6 +34,10 @@ STOPPING = (
     "stopping after this epoch and the evaluations that are due or under way "
     "(once more: at once, losing what came after the last checkpoint)"
 )
+
+Record = Annotated[bool, typer.Option("--record", help="Record the session to one MCAP file, in the run's folder.")]
+RecordTo = Annotated[Path | None, typer.Option(help="The same, to this file.")]
+Person = Annotated[str, typer.Option(help="Who attends, as they want to be called in what is recorded.")]
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -61,7 +66,16 @@ def learn(
     epochs: Annotated[int | None, typer.Option(min=1, help="Epochs, in place of the learner's own number.")] = None,
     out: Annotated[Path | None, typer.Option(help="Run folder.  [default: runs/SCENARIO-PRESET-SEED]")] = None,
     workers: Annotated[int | None, typer.Option(min=0, help="Evaluation processes beside this one.")] = None,
+    record_to: RecordTo = None,
+    person: Person = "unnamed",
+    replay: Annotated[
+        Path | None, typer.Option(help="No run: let the learner live through this session again, and compare.")
+    ] = None,
+    taught_by: Annotated[
+        list[Path] | None, typer.Option("--from", help="Show this session to a new learner first; more than once.")
+    ] = None,
     *,
+    record: Record = False,
     resume: Annotated[
         bool, typer.Option("--resume", help="Go on with the run in the folder, if there is one.")
     ] = False,
@@ -74,15 +88,22 @@ def learn(
     a second one stops at once. --resume goes on: in lock-step bit for bit, by the wall clock (rigs with an address)
     from the same learnt state.
     """
+    if replay is not None:
+        _replay(replay, json=json)
+        return
     from learning.session import open_session  # brings torch, seconds that reports do not need
 
     wanted = Wanted(scenario=scenario, rig=rig, preset=preset, seed=seed, epochs=epochs, judged=judged)
     folder = RunFolder(out or _default_folder(wanted))
     console = Console(stderr=True)
     stopwatch = Stopwatch(perf_counter)
+    recorded = RecordWanted.of(record_to, is_asked=record, person=person, tell=_tell_loss)
     with folder:
         consent = Consent(folder, workers=workers)
-        session = open_session(folder, wanted, resume=resume, stopwatch=stopwatch, consent=consent)
+        session = open_session(
+            folder, wanted, resume=resume, stopwatch=stopwatch, consent=consent, record=recorded,
+            taught_by=taught_by or (),
+        )  # fmt: skip
         try:
             ended = _run(session, folder, console, consent.n_workers)
         finally:
@@ -94,6 +115,25 @@ def learn(
         typer.echo(msgspec.json.encode(run.summary).decode())
     else:
         _tell(run, ended)
+
+
+def _replay(path: Path, *, json: bool) -> None:
+    """Replay a session into the learner; exit code 1 where it does not come to the same."""
+    from learning.replaying import replay_to_learning  # brings torch
+
+    with Status("replaying", now_s=perf_counter) as status:
+        replayed, _ = replay_to_learning(path, tell=lambda n_done: status(f"replayed up to epoch {n_done}"))
+    if json:
+        typer.echo(msgspec.json.encode(replayed.told()).decode())
+    else:
+        for line in replayed.lines():
+            typer.echo(line)
+    if not replayed.is_identical:
+        raise typer.Exit(EXIT_FAILED)
+
+
+def _tell_loss(why: str) -> None:
+    typer.echo(f"recording: {why}", err=True)
 
 
 def _run(session: "Session", folder: RunFolder, console: Console, n_workers: int) -> Ended:
@@ -127,7 +167,10 @@ def evaluate(
         int | None, typer.Option(min=0, help="Epoch whose rules are in force.  [default: the last one learnt]")
     ] = None,
     rig: Annotated[str | None, typer.Option(help="Shipped rig or a file to test on.  [default: the run's]")] = None,
+    record_to: RecordTo = None,
+    person: Person = "unnamed",
     *,
+    record: Record = False,
     json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
 ) -> None:
     """Test what a run's newest checkpoint holds: learning off, fresh table layouts, every goal."""
@@ -136,7 +179,10 @@ def evaluate(
     folder = RunFolder(run)
     goals = [goal.name for goal in folder.manifest().goals]
     with Status(f"testing {len(goals)} goals, {tests} epochs each", now_s=perf_counter) as status:
-        assessed = assess(folder, n_tests=tests, seed=seed, rules_epoch=rules_epoch, rig=rig, tell=status)
+        assessed = assess(
+            folder, n_tests=tests, seed=seed, rules_epoch=rules_epoch, rig=rig, tell=status,
+            record=RecordWanted.of(record_to, is_asked=record, person=person, tell=_tell_loss),
+        )  # fmt: skip
     rows, stops = assessed.rows, assessed.stops
     if json:
         typer.echo(msgspec.json.encode({"goals": goals, "rows": rows, "stops": stops.as_tree()}).decode())

@@ -82,6 +82,7 @@ class Experiment:
         oracle: Oracle | None = None,
         stopwatch: Stopwatch | None = None,
         when_kept: Callable[[], None] = lambda: None,
+        when_captured: Callable[[int, Agent], None] = lambda _n_done, _agent: None,
     ) -> None:
         self._plan = plan
         self._agent = agent
@@ -93,6 +94,7 @@ class Experiment:
         self._oracle = oracle
         self._stopwatch = stopwatch or Stopwatch()
         self._when_kept = when_kept
+        self._when_captured = when_captured
         self._cases: dict[int, list[GoalState]] = {}
         self._waiting: deque[_Due] = deque()
         self._n_evaluation_rows = tables.n_rows("evaluations")
@@ -223,6 +225,7 @@ class Experiment:
             "n_rows": n_rows,
             "agent": self._agent.state_dict(),
         }
+        self._when_captured(self._n_done, self._agent)
         captured = _Due(epoch=self._n_done, state=encode(state), n_evaluation_rows=self._n_evaluation_rows)
         self._waiting.append(captured)
         self._keep_checkpoints()

@@ -180,6 +180,23 @@ class ExpertSet:
             self._models[goal].train()
         self._forward.train()
 
+    def demonstrate(self, goal: int, distances_m: Array, states: Array, *, is_success: bool) -> None:
+        """Take in places that somebody else went through: up to where a goal came about, or where it did not.
+
+        Nothing is said of the model's own skill. Goals are indices; distances (k, n) metres, states (k, m).
+        """
+        rows = zip(distances_m, states, strict=True)
+        trace = np.array([normalised(d[None], s, self._scales_m)[0] for d, s in rows])
+        if is_success:
+            self._models[goal].succeed(trace, distances_m[-1], is_own=True)
+        else:
+            self._models[goal].fail(trace)
+
+    def study(self, n_trials: int) -> None:
+        """Train every model as much as so many trials would."""
+        for model in self._models:
+            model.study(n_trials)
+
     def utility(self, subgoal: int, percept: Percept) -> float:
         """Return the expected probability of achieving the sub-goal from here, in [0, 1]."""
         distances = np.array([percept.distances_m])

@@ -1,8 +1,6 @@
 """What a run is made of and with what it is made, as its folder keeps it."""
 
 import hashlib
-import subprocess
-from pathlib import Path
 
 from config.resolved import Resolved, dump_resolved
 from config.scenario import Goal, Scenario
@@ -11,10 +9,9 @@ from learning.metrics import optimal_trials
 from learning.run_folder import GoalInfo, Manifest
 from robot.bench import bench_report
 from robot.messages import PlantIdentity
+from robot.revision import git_revision
 
 __all__ = ["changes_of", "manifest_of"]
-
-GIT_PATIENCE_S = 5.0
 
 
 def manifest_of(
@@ -37,7 +34,7 @@ def manifest_of(
         config_sha256=hashlib.sha256(dump_resolved(resolved).encode()).hexdigest(),
         plant=f"{identity.kind.value}/{identity.model}/{identity.serial}",
         model_sha256=model_sha256,
-        git=_git_revision(),
+        git=git_revision(),
         versions=here.versions,
         machine=here.machine,
     )
@@ -56,16 +53,3 @@ def _colour(goal: Goal, scenario: Scenario) -> tuple[float, float, float]:
     """Return the colour of what a goal is about."""
     things = (*scenario.buttons, *scenario.cylinders, *scenario.boxes)
     return next(thing.colour for thing in things if thing.name == goal.object)
-
-
-def _git_revision() -> str | None:
-    """Return the commit of the checkout that this package lies in, -dirty where files differ; None outside one."""
-    root = Path(__file__).parents[1]
-    if not (root / ".git").exists():
-        return None
-    command = ["git", "-C", str(root), "describe", "--always", "--dirty", "--abbrev=40", "--exclude=*"]
-    try:
-        done = subprocess.run(command, capture_output=True, text=True, timeout=GIT_PATIENCE_S, check=False)
-    except (OSError, subprocess.TimeoutExpired):
-        return None
-    return done.stdout.strip() or None

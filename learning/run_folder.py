@@ -17,13 +17,27 @@ from learning.rows import EvaluationRow, GoalRow, GraphRow, TrialRow, read_rows
 from learning.stops import Stops
 from learning.time_spent import TimeSpent
 
-__all__ = ["CONFIG_NAME", "FORMAT", "MANIFEST_NAME", "PROFILE_NAME", "STOPS_NAME", "GoalInfo", "Manifest", "RunFolder"]
+__all__ = [
+    "CONFIG_NAME",
+    "FORMAT",
+    "MANIFEST_NAME",
+    "PROFILE_NAME",
+    "SESSION_SUFFIX",
+    "STOPS_NAME",
+    "TAUGHT_NAME",
+    "GoalInfo",
+    "Manifest",
+    "RunFolder",
+]
 
 FORMAT = 1
 CONFIG_NAME = "config.yaml"
 MANIFEST_NAME = "run.json"
 PROFILE_NAME = "profile.json"
 STOPS_NAME = "stops.json"
+SESSION_SUFFIX = ".mcap"
+TAUGHT_NAME = "taught.json"
+"""What the learner was shown before it began, and where each piece of it comes from."""
 
 Share = Annotated[float, Meta(ge=0.0, le=1.0)]
 
@@ -247,4 +261,4 @@ def _refuse_strange_optima(path: Path, manifest: Manifest) -> None:
 
 def _is_left_over(entry: Path) -> bool:
     """Whether a file is what a start that was killed half-way leaves behind."""
-    return entry.name in ("lock", MANIFEST_NAME) or entry.suffix == ".tmp"
+    return entry.name in ("lock", MANIFEST_NAME, TAUGHT_NAME) or entry.suffix in (".tmp", SESSION_SUFFIX)

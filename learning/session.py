@@ -1,22 +1,31 @@
 """One session of a run: begin it or take it up again, learn, and leave a folder that tells all."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import Any
 
 from config.resolved import Resolved, dump_resolved
 from learning.assembly import RobotLearner, build_agent, learner_maker
+from learning.checkpoint import encode
 from learning.ended import Ended
 from learning.evaluation_pool import EvaluationPool
 from learning.experiment import Experiment, Plan
+from learning.experts import ExpertSet
+from learning.offline import teach
 from learning.progress import Progress
 from learning.provenance import manifest_of
-from learning.run_folder import Manifest, RunFolder
+from learning.recorded import RecordedDecisions
+from learning.recording import RecordWanted, open_recording
+from learning.run_folder import TAUGHT_NAME, Manifest, RunFolder
 from learning.stops import Stops
 from learning.stopwatch import Stopwatch
 from learning.tables import Tables
 from learning.time_spent import TimeSpent
 from learning.wanted import Wanted, refuse_another, resolve_wanted
 from robot.oracle import rules_oracle
+from robot.recording.messages import Purpose
+from robot.recording.recording import STATE, Recording
+from robot.station import Station
 
 __all__ = ["Session", "open_session"]
 
@@ -25,7 +34,14 @@ class Session:
     """A run that is open for learning. Made by open_session; close it when done."""
 
     def __init__(
-        self, *, folder: RunFolder, resolved: Resolved, manifest: Manifest, learner: RobotLearner, stopwatch: Stopwatch
+        self,
+        *,
+        folder: RunFolder,
+        resolved: Resolved,
+        manifest: Manifest,
+        learner: RobotLearner,
+        stopwatch: Stopwatch,
+        recording: Recording | None = None,
     ) -> None:
         self.manifest = manifest
         self.remarks: list[str] = []
@@ -36,11 +52,30 @@ class Session:
         self._resolved = resolved
         self._learner = learner
         self._stopwatch = stopwatch
+        self._recording = recording
 
     @property
     def n_done(self) -> int:
         """Epochs done before this session."""
         return 0 if self.state is None else self.state["n_done"]
+
+    def teach(self, paths: Sequence[Path]) -> None:
+        """Show sessions to the learner before it begins, and keep in the folder what it was shown.
+
+        Raises:
+            SessionError: one is torn, or of another scenario, or they show nothing.
+        """
+        learner = self._learner
+        experts = learner.agent.experts
+        assert isinstance(experts, ExpertSet), "build_agent makes one"
+        scenario = self._resolved.scenario.name
+        taught = teach(learner.agent, experts, learner.station.spec, paths, scenario=scenario)
+        self._folder.write_json(TAUGHT_NAME, taught)
+        if self._recording is not None:
+            self._recording.recorder.attach(STATE, "application/zip", encode(learner.agent.state_dict()))
+        names = [goal.name for goal in self.manifest.goals]
+        shown = ", ".join(f"{name} {n}" for name, n in zip(names, taught.ways_by_goal, strict=True))
+        self.remarks.append(f"taught by {taught.n_sessions} sessions, {taught.n_epochs} epochs; ways shown: {shown}")
 
     def run(self, progress: Progress, *, n_workers: int, should_stop: Callable[[], bool]) -> Ended:
         """Learn until all epochs are done or a stop is asked for.
@@ -63,9 +98,10 @@ class Session:
             self._folder.keep_stops(stopped + learner.stops)
 
         self._stopwatch.lap("start-up")
+        heard = self._heard()
         pool = EvaluationPool(
             tester=build_agent(self._resolved, learner.station.spec, seed=manifest.seed),
-            station=learner.station,
+            station=self._station(Purpose.TEST),
             make_learner=learner_maker(self._resolved, seed=manifest.seed),
             n_workers=n_workers,
             report=progress.say,
@@ -74,7 +110,7 @@ class Session:
             experiment = Experiment(
                 plan=Plan(seed=manifest.seed, protocol=self._resolved.learning.experiment, changes=manifest.changes),
                 agent=learner.agent,
-                station=learner.station,
+                station=self._station(Purpose.LEARN),
                 pool=pool,
                 tables=tables,
                 store=self._folder.checkpoints,
@@ -82,6 +118,7 @@ class Session:
                 oracle=rules_oracle(self._resolved),
                 stopwatch=self._stopwatch,
                 when_kept=lambda: keep(before + self._spent(progress)),
+                when_captured=(lambda _n_done, _agent: None) if heard is None else heard.captured,
             )
             if state is not None:
                 experiment.restore(state)
@@ -92,6 +129,21 @@ class Session:
             keep(spent)
         return Ended(n_done=n_done, n_epochs=manifest.n_epochs, spent=spent)
 
+    def _station(self, purpose: Purpose) -> Station:
+        station = self._learner.station
+        if self._recording is None:
+            return station
+        return self._recording.station(station, purpose=purpose, measure=self._learner.measured)
+
+    def _heard(self) -> RecordedDecisions | None:
+        """Let the agent's decisions be recorded, where a run is."""
+        if self._recording is None:
+            return None
+        names = [goal.name for goal in self.manifest.goals]
+        heard = RecordedDecisions(self._recording, names)
+        self._learner.agent.witness = heard
+        return heard
+
     def _spent(self, progress: Progress) -> TimeSpent:
         return TimeSpent(
             seconds=self._stopwatch.now_s() - self._stopwatch.started_s,
@@ -100,8 +152,10 @@ class Session:
         )
 
     def close(self) -> None:
-        """Release the station. Idempotent."""
+        """Release the station and finish what was recorded. Idempotent."""
         self._learner.close()
+        if self._recording is not None:
+            self._recording.close()
 
 
 def open_session(
@@ -111,6 +165,8 @@ def open_session(
     resume: bool,
     stopwatch: Stopwatch,
     consent: Callable[[Resolved, int], None] = lambda _resolved, _n_done: None,
+    record: RecordWanted | None = None,
+    taught_by: Sequence[Path] = (),
 ) -> Session:
     """Begin a run in a folder, or read where the run that it holds was left.
 
@@ -121,6 +177,8 @@ def open_session(
         stopwatch: hears of every layer's time.
         consent: is told what the run is made of and how many epochs are done, before any arm is connected to; raises
             where it shall not go on.
+        record: where this session is recorded; None records nothing.
+        taught_by: sessions that a new run's learner is shown before it begins.
 
     Raises:
         ConfigError: a config file is missing or wrong.
@@ -128,25 +186,30 @@ def open_session(
             config is not the one that the run began with.
     """
     if resume and folder.holds_run():
-        return _take_up(folder, wanted, stopwatch, consent)
+        return _take_up(folder, wanted, stopwatch, consent, record)
     folder.refuse_unless_empty()
     resolved = resolve_wanted(wanted)
     consent(resolved, 0)
-    session = _assemble(folder, resolved, wanted.seed or 0, stopwatch)
+    session = _assemble(folder, resolved, wanted.seed or 0, stopwatch, record)
+    if taught_by:
+        session.teach(taught_by)
     folder.start(session.manifest, dump_resolved(resolved))
     return session
 
 
 def _take_up(
-    folder: RunFolder, wanted: Wanted, stopwatch: Stopwatch, consent: Callable[[Resolved, int], None]
+    folder: RunFolder,
+    wanted: Wanted,
+    stopwatch: Stopwatch,
+    consent: Callable[[Resolved, int], None],
+    record: RecordWanted | None,
 ) -> Session:
     then, resolved = folder.manifest(), folder.config()
     folder.refuse_changed_config()
     refuse_another(wanted, str(folder.path), resolved, then.seed)
     state, passed_over = folder.checkpoints.newest() if folder.checkpoints.exists() else (None, [])
     consent(resolved, 0 if state is None else state["n_done"])
-    session = _assemble(folder, resolved, then.seed, stopwatch)
-    session.state = state
+    session = _assemble(folder, resolved, then.seed, stopwatch, record, state)
     session.remarks += _differences(then, session.manifest)
     session.remarks += [f"passed over a torn checkpoint: {reason}" for reason in passed_over]
     if resolved.rig.bus is not None and state is not None:
@@ -154,8 +217,24 @@ def _take_up(
     return session
 
 
-def _assemble(folder: RunFolder, resolved: Resolved, seed: int, stopwatch: Stopwatch) -> Session:
-    learner = RobotLearner(resolved, seed=seed, stopwatch=stopwatch, pictures=folder.path / "resets")
+def _assemble(
+    folder: RunFolder,
+    resolved: Resolved,
+    seed: int,
+    stopwatch: Stopwatch,
+    record: RecordWanted | None,
+    state: dict[str, Any] | None = None,
+) -> Session:
+    recording = None if record is None else open_recording(record, folder, resolved, seed=seed, state=state)
+    try:
+        learner = RobotLearner(
+            resolved, seed=seed, stopwatch=stopwatch, pictures=folder.path / "resets",
+            tap=None if recording is None else recording.ticks,
+        )  # fmt: skip
+    except BaseException:
+        if recording is not None:
+            recording.close()
+        raise
     manifest = manifest_of(
         resolved,
         seed=seed,
@@ -163,7 +242,11 @@ def _assemble(folder: RunFolder, resolved: Resolved, seed: int, stopwatch: Stopw
         identity=learner.identity,
         model_sha256=learner.model_sha256,
     )
-    return Session(folder=folder, resolved=resolved, manifest=manifest, learner=learner, stopwatch=stopwatch)
+    session = Session(
+        folder=folder, resolved=resolved, manifest=manifest, learner=learner, stopwatch=stopwatch, recording=recording
+    )
+    session.state = state
+    return session
 
 
 def _differences(then: Manifest, now: Manifest) -> list[str]:

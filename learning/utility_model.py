@@ -156,6 +156,11 @@ class UtilityModel:
         if self._successes.n and not self.is_settled:
             self._fit(self._config.updates_per_trial)
 
+    def study(self, n_trials: int) -> None:
+        """Fit the network as much as so many trials would, whatever came of those there were."""
+        if self._successes.n:
+            self._fit(n_trials * self._config.updates_per_trial)
+
     def _fit(self, n_updates: int) -> None:
         self._network.learning_rate = self._config.learning_rate / (1.0 + self._assurance / self._config.rate_half)
         for _ in range(n_updates):

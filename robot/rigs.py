@@ -21,6 +21,7 @@ from robot.own_senses import OwnSenses
 from robot.safety import Operator
 from robot.station_doors import Perceives
 from robot.tick_loop import TickLoop
+from robot.tick_tap import TickTap
 from robot.timed import time_world
 
 if TYPE_CHECKING:
@@ -71,6 +72,7 @@ def build_station(
     is_driven: bool = False,
     cell_shows: Callable[[str], None] | None = None,
     host_ns: Callable[[], int] = monotonic_ns,
+    tap: TickTap | None = None,
 ) -> LocalStation:
     """Return the station of a resolved config, disarmed and not yet connected.
 
@@ -83,6 +85,7 @@ def build_station(
             is good enough.
         cell_shows: Shows a text at the cell of an arm that is held in this process; a rig with a bus has its own.
         host_ns: This process's monotonic time, for leases and answers at the cell; never for motion.
+        tap: Hears of every tick, where the arm is held in this process.
     """
     rig, arm, scenario = resolved.rig, resolved.arm, resolved.scenario
     check_usable(rig)
@@ -95,8 +98,9 @@ def build_station(
     if heard_by is not None:
         time_world(world, heard_by)
     loop = TickLoop(
-        arm=world.arm, config=arm, scenario=scenario, rule_sets=resolved.rule_sets, rig=rig, profile=resolved.profile
-    )
+        arm=world.arm, config=arm, scenario=scenario, rule_sets=resolved.rule_sets, rig=rig, profile=resolved.profile,
+        tap=tap,
+    )  # fmt: skip
     held = limited(arm, resolved.profile)
     return LocalStation(
         world=world, loop=loop, perception=perception, arm=held, scenario=scenario, rig=rig,
@@ -111,10 +115,11 @@ def find_station(
     heard_by: Callable[[str], None] | None = None,
     pictures: Path = Path("resets"),
     is_driven: bool = False,
+    tap: TickTap | None = None,
 ) -> "LocalStation | RemoteStation":
     """Return the station of a rig: of the robot node on its bus where there is one, else one of this process's own.
 
-    Where a person lays the table out it is this process's own, whose terminal he sits at.
+    Where a person lays the table out it is this process's own, whose terminal he sits at. Ticks are tapped in an own one only.
     """
     rig = resolved.rig
     check_usable(rig)
@@ -122,7 +127,7 @@ def find_station(
         found = load("robot.lab:join_robot_node")(resolved, is_driven=is_driven)
         if found is not None:
             return found
-    return build_station(resolved, heard_by=heard_by, pictures=pictures, is_driven=is_driven)
+    return build_station(resolved, heard_by=heard_by, pictures=pictures, is_driven=is_driven, tap=tap)
 
 
 def build_perception(resolved: Resolved) -> Perceives:

@@ -31,6 +31,7 @@ from robot.safety import (
     check_profile_fits,
 )
 from robot.surroundings import Surroundings
+from robot.tick_tap import TickTap
 
 __all__ = ["Stride", "TickLoop", "guarded"]
 
@@ -118,6 +119,7 @@ class TickLoop:
         rig: Rig,
         profile: Profile,
         when_latched: Callable[[Verdict], object] | None = None,
+        tap: TickTap | None = None,
     ) -> None:
         """Put the parts together; the arm is not connected to.
 
@@ -129,13 +131,14 @@ class TickLoop:
             rule_sets: one for each span of the scenario's schedule.
             rig: how long a tick is.
             when_latched: told of a refusal before the arm is stopped for it.
+            tap: hears of every tick.
 
         Raises:
             RobotConfigError: the arm's tick is another, or the profile allows more than the arm can do.
         """
         if abs(arm.spec.rate_hz * rig.tick_s - 1.0) > WHOLE_TICKS:
             raise RobotConfigError(f"rig {rig.name}: tick {rig.tick_s} s, the plant's is {1 / arm.spec.rate_hz} s")
-        self._arm = arm
+        self._arm, self._tap = arm, tap
         check_profile_fits(profile, arm.spec)
         config = limited(config, profile)
         self._cell = Cell(scenario=scenario, rule_sets=rule_sets, arm=config)
@@ -262,7 +265,7 @@ class TickLoop:
         before, now_ns = self.state, self._arm.clock.now_ns()
         verdict = self._gate.admit(intent, now_ns=now_ns)
         if verdict is not None:
-            return verdict
+            return self._told(verdict)
         if wait_at_m is not None and not all(map(isfinite, wait_at_m)):
             return self.latch(Reason.NOT_FINITE, f"expected a place to wait at, came {wait_at_m}")
         if around is not None:
@@ -279,7 +282,7 @@ class TickLoop:
 
     def latch(self, reason: Reason, detail: str) -> Verdict:
         """Stop the arm and latch, for a reason that was found outside."""
-        return self._gate.latch(reason, detail, now_ns=self._arm.clock.now_ns())
+        return self._told(self._gate.latch(reason, detail, now_ns=self._arm.clock.now_ns()))
 
     def rest(self) -> None:
         """Come to rest and stay there: what ticks do when the last intent is too old."""
@@ -304,12 +307,19 @@ class TickLoop:
                 digital_out=digital_out,
             )
             verdict = gate.write(command, state, now_ns=now_ns)
+            if self._tap is not None:
+                self._tap.commanded(command, self._mover.limiters, verdict)
             if verdict is None:
                 arm.clock.wait_tick()
                 self._read_now()
         except WireError as error:
             untaken = None if command is gate.sent else command
-            return gate.latch(_reason_of(error), str(error), now_ns=now_ns, refused=untaken)
+            return self._told(gate.latch(_reason_of(error), str(error), now_ns=now_ns, refused=untaken))
+        return verdict
+
+    def _told(self, verdict: Verdict) -> Verdict:
+        if self._tap is not None:
+            self._tap.refused(verdict)
         return verdict
 
     def _read(self, now_ns: int) -> ArmState:
@@ -319,6 +329,8 @@ class TickLoop:
     def _read_now(self) -> ArmState:
         self._read_ns = self._arm.clock.now_ns()
         self.state = self._arm.read()
+        if self._tap is not None:
+            self._tap.measured(self.state)
         return self.state
 
     def report(self, verdict: Verdict | None, *, is_begun: bool) -> Stride:

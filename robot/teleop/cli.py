@@ -41,6 +41,8 @@ def drive(
     ] = "keyboard",
     speed: Annotated[float, typer.Option(min=0.01, max=1.0, help="Share of full speed to begin with.")] = 0.5,
     seed: Annotated[int, typer.Option(min=0, help="Which table is drawn, where a twin lays it out.")] = 0,
+    record_to: Annotated[Path | None, typer.Option(help="Record the drive to this MCAP file.")] = None,
+    person: Annotated[str, typer.Option(help="Who drives, as they want to be called in what is recorded.")] = "unnamed",
     *,
     view: Annotated[bool, typer.Option("--view/--no-view", help="Show the table while driving.")] = True,
     preview: Annotated[
@@ -59,7 +61,7 @@ def drive(
     run_drive(
         DriveOptions(
             rig=rig, scenario=scenario, device=device, speed=speed, seed=seed, view=view, preview=preview, fast=fast,
-            json=json,
+            json=json, record_to=record_to, person=person,
         )
     )  # fmt: skip
 

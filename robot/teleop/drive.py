@@ -2,6 +2,7 @@
 
 import signal
 from contextlib import ExitStack
+from pathlib import Path
 from time import monotonic_ns
 from typing import Protocol
 
@@ -14,6 +15,8 @@ from config.resolved import Resolved
 from robot.errors import RobotConfigError, RobotError
 from robot.messages import StationMode, StationState
 from robot.person import PersonOperator, TerminalPerson
+from robot.recording.messages import Purpose
+from robot.recording.recording import UNNAMED, Recording
 from robot.rigs import build_operator, build_shadow, build_view, find_station
 from robot.safety import Armable
 from robot.stop_request import StopRequest
@@ -55,6 +58,9 @@ class DriveOptions(msgspec.Struct, frozen=True, kw_only=True):
     preview: bool
     fast: bool
     json: bool
+    record_to: Path | None = None
+    """Where the drive is recorded, None where it is not."""
+    person: str = UNNAMED
 
     @property
     def is_script(self) -> bool:
@@ -75,14 +81,17 @@ def run_drive(options: DriveOptions) -> None:
     console = Console(stderr=True)
     with ExitStack() as stack:
         end = stack.enter_context(StopRequest(signals=END_SIGNALS, at_once=(signal.SIGINT,)))
-        station = stack.enter_context(find_station(resolved, is_driven=True))
+        recording = _open_recording(resolved, options, stack)
+        tap = None if recording is None else recording.ticks
+        station = stack.enter_context(find_station(resolved, is_driven=True, tap=tap))
+        driven: DrivenStation = station if recording is None else recording.drive(station)
         station.take_lease(f"teleop by {device.name}", life_ns=None if options.is_script else LEASE_NS)
-        _arm(station, resolved, seed=options.seed)
+        _arm(station, driven, resolved, seed=options.seed)
         view = _open_view(resolved, console, stack) if options.view else None
         readout = ReadOut(keys=device.keys, console=console, now_ns=monotonic_ns)
         stack.enter_context(readout)
         driver = Driver(
-            station=station,
+            station=driven,
             device=device,
             jog=Jog(_limits(resolved, options.speed)),
             pace=pace,
@@ -153,12 +162,25 @@ class Rearm:
         return True
 
 
-def _arm(station: DrivenArm, resolved: Resolved, *, seed: int) -> None:
+def _open_recording(resolved: Resolved, options: DriveOptions, stack: ExitStack) -> Recording | None:
+    """Begin to record, where that is wanted; it is finished after the arm was given back."""
+    if options.record_to is None:
+        return None
+    recording = Recording(
+        options.record_to, resolved, purpose=Purpose.DRIVE, seed=options.seed, person=options.person,
+        about={"device": options.device.partition(":")[0]},
+        tell=lambda why: typer.echo(f"recording: {why}", err=True),
+    )  # fmt: skip
+    stack.callback(recording.close)
+    return recording
+
+
+def _arm(station: DrivenArm, driven: DrivenStation, resolved: Resolved, *, seed: int) -> None:
     """Let the rig's operator arm the station, and a twin lay its table out."""
     operator = build_operator(resolved.rig) or PersonOperator()
     operator.arm_once(station)
     if resolved.rig.reset == "twin":
-        station.reset(seed=seed, epoch=0)
+        driven.reset(seed=seed, epoch=0)
 
 
 def _limits(resolved: Resolved, speed: float) -> JogLimits:

@@ -1,0 +1,16 @@
+"""Which topics share chunks."""
+
+from enum import StrEnum
+
+__all__ = ["Lane"]
+
+
+class Lane(StrEnum):
+    """Messages that are read together lie together."""
+
+    TICKS = "ticks"
+    """Measurements, commands and verdicts of every tick."""
+    DECISIONS = "decisions"
+    """Percepts, decisions, what became of them: all that learning needs."""
+    VIEW = "view"
+    """What viewers draw."""

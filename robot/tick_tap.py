@@ -1,0 +1,23 @@
+"""Who may listen to every tick of an arm. Nothing that it does comes back."""
+
+from typing import Protocol
+
+from robot.messages import ArmCommand, ArmState, Verdict
+
+__all__ = ["TickTap"]
+
+
+class TickTap(Protocol):
+    """Told of each tick, by whoever holds the arm; never raises, never waits."""
+
+    def measured(self, state: ArmState) -> None:
+        """Take note of a measurement; the same may come twice."""
+        ...
+
+    def commanded(self, command: ArmCommand, limiters: tuple[str, ...], verdict: Verdict | None) -> None:
+        """Take note of what was requested, what shaped it on its way, and the refusal; None where it was sent."""
+        ...
+
+    def refused(self, verdict: Verdict) -> None:
+        """Take note of a refusal that was of no command: of an intent, of a wire."""
+        ...
