@@ -52,7 +52,8 @@ class CameraPerception:
         self._names = tuple(t.name for t in (*scenario.buttons, *scenario.boxes, *scenario.cylinders))
         self._camera: Camera | None = None
         self._began_ns: int | None = None
-        self._seen_ns = 0
+        self._lit_ns: int | None = None
+        """When the newest picture that shows the table was exposed."""
 
     def watch(self, cameras: Mapping[str, Camera]) -> None:
         """Take the camera to look through, of a plant's.
@@ -93,14 +94,14 @@ class CameraPerception:
         """
         del scene
         if self._began_ns is None:
-            self._began_ns = self._seen_ns = arm.stamp_ns
+            self._began_ns, self._lit_ns = arm.stamp_ns, None
             self._tracks.forget(arm.stamp_ns)
         self._course.note(arm)
         self._tracks.note_arm(arm)
         frame = self._looked_through().read(arm.stamp_ns)
         if frame is not None:
             self._look(frame)
-        silence_ns = arm.stamp_ns - self._seen_ns
+        silence_ns = arm.stamp_ns - (self._began_ns if self._lit_ns is None else self._lit_ns)
         if silence_ns > SILENT_NS:
             raise CameraSilentError(
                 f"camera {self._file.name}: expected a picture every {FRESH_NS / 1e6:.0f} ms, the last one that shows "
@@ -115,7 +116,7 @@ class CameraPerception:
         seen = self._detector.look(frame, outlines, self._tracks.near(frame.sequence))
         self._tracks.note_picture(seen)
         if seen.is_lit:
-            self._seen_ns = max(self._seen_ns, frame.stamp_ns)
+            self._lit_ns = frame.stamp_ns
 
     def _percept(self, arm: ArmState, *, is_fresh: bool) -> Percept:
         by_name = {name: self._tracks.thing(name, arm) for name in self._names}
