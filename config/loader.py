@@ -20,7 +20,7 @@ from config.resolved import Resolved
 from config.rig import DEFAULT_LIMITS, Rig
 from config.rules import RuleSet
 from config.scenario import Scenario
-from config.sources import Source, read_path, read_source
+from config.sources import Source, is_path, read_path, read_source
 from config.wiring import check_cell_fits, check_reachable, check_wiring
 from config.workspace import fenced
 from config.yaml_text import Tree, parse_yaml
@@ -222,9 +222,21 @@ def _named_by(rig: Source, key: str, folder: str, name: str) -> Source:
 def _load_rig(source: Source) -> Rig:
     rig = _decode(source, Rig)
     check_rig(rig, source.file)
-    if rig.keys is None or source.folder is None:
+    if source.folder is None:
         return rig
-    return msgspec.structs.replace(rig, keys=str(source.folder.resolve() / Path(rig.keys).expanduser()))
+    folder = source.folder.resolve()
+    if rig.keys is not None:
+        rig = msgspec.structs.replace(rig, keys=str(folder / Path(rig.keys).expanduser()))
+    if rig.camera is None:
+        return rig
+    calibration, colours = (_from(folder, name) for name in (rig.camera.calibration, rig.camera.colours))
+    camera = msgspec.structs.replace(rig.camera, calibration=calibration, colours=colours)
+    return msgspec.structs.replace(rig, camera=camera)
+
+
+def _from(folder: Path, name: str) -> str:
+    """Return a path that a file in a folder names, from anywhere; a shipped file's name as it is."""
+    return str(folder / Path(name).expanduser()) if is_path(name) else name
 
 
 def _load_learning(source: Source) -> LearningConfig:

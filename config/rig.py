@@ -6,7 +6,7 @@ from msgspec import Meta
 
 from config.values import Name, Section
 
-__all__ = ["DEFAULT_LIMITS", "PlantExpected", "Rig"]
+__all__ = ["DEFAULT_LIMITS", "PlantExpected", "Rig", "RigCamera"]
 
 DEFAULT_LIMITS = "ur5e_parallel_jaw_85"
 
@@ -19,6 +19,17 @@ class PlantExpected(Section, frozen=True, kw_only=True):
     kind: Annotated[str, Meta(pattern=r"^(real|virtual|twin|fake)\Z")]
     model: str
     serial: str
+
+
+class RigCamera(Section, frozen=True, kw_only=True):
+    """One camera of a rig, and what is known of it. Files are shipped names or paths, from the rig's file on."""
+
+    name: Name
+    """Which of the plant's cameras."""
+    calibration: Annotated[str, Meta(min_length=1, max_length=500)]
+    """Its lens and place, as `autotelic calibrate` wrote them."""
+    colours: Annotated[str, Meta(min_length=1, max_length=500)]
+    """How the scenario's things look through it, as `autotelic perception learn` wrote it."""
 
 
 class Rig(Section, frozen=True, kw_only=True):
@@ -35,6 +46,8 @@ class Rig(Section, frozen=True, kw_only=True):
     plant: ImportString
     perception: ImportString | None = None
     """What makes percepts; without one nothing can be learnt here, and the arm is not connected to."""
+    camera: "RigCamera | None" = None
+    """What a perception by camera looks through."""
     operator: ImportString | None = None
     """Who arms the station where no hardware is attached; refused by a real arm."""
     view: ImportString | None = None

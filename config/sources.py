@@ -10,7 +10,7 @@ import msgspec
 from config.decode import nearest
 from config.errors import ConfigError
 
-__all__ = ["MAX_BYTES", "Source", "read_path", "read_source", "shipped_names"]
+__all__ = ["MAX_BYTES", "Source", "is_path", "read_path", "read_source", "shipped_names"]
 
 MAX_BYTES = 1_000_000
 
@@ -36,7 +36,7 @@ def read_source(folder: str, name: str | Path, *, base: Path | None = None) -> S
     Raises:
         ConfigError: no such name or file, or not a text file of reasonable size.
     """
-    if isinstance(name, Path) or "/" in name or name.endswith((".yaml", ".yml")):
+    if isinstance(name, Path) or is_path(name):
         return read_path(Path(name) if base is None else base / name)
     names = shipped_names(folder)
     if name not in names:
@@ -45,6 +45,11 @@ def read_source(folder: str, name: str | Path, *, base: Path | None = None) -> S
     content = _shipped(folder).joinpath(f"{name}.yaml").read_bytes()
     file = f"{folder}/{name}.yaml"
     return Source(file=file, folder=None, text=_text(content, file))
+
+
+def is_path(name: str) -> bool:
+    """Return whether a name is a path of the user's own, and not a shipped file's."""
+    return "/" in name or name.endswith((".yaml", ".yml"))
 
 
 def read_path(path: Path) -> Source:

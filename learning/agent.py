@@ -11,6 +11,7 @@ import msgspec
 
 from config.learning import Experiment
 from learning.interfaces import Attempt, Experts, GoalState, Kept, SubgoalSelector, TrialOutcome
+from learning.looking import ways_to_look
 from learning.stopwatch import Stopwatch
 from robot.messages import Heading, Percept
 from robot.station import Station
@@ -55,6 +56,10 @@ class GoalJudge(Protocol):
 
     def achieved(self, percept: Percept) -> GoalState:
         """Return which goals hold now."""
+        ...
+
+    def known(self, percept: Percept, *, since_ns: int | None = None) -> GoalState:
+        """Return of which goals it is known whether they hold, by what was seen since."""
         ...
 
     def is_hand_free(self, goal: int, percept: Percept) -> bool:
@@ -249,6 +254,9 @@ class Agent:
         is_fair = self.judge.is_hand_free(subgoal, scene.percept)
         self.experts.begin_trial(subgoal, scene.percept, explore=explore)
         outcome, n_steps = self._pursue(station, scene, subgoal)
+        if outcome in (TrialOutcome.BLOCKED, TrialOutcome.NOT_REACHED):
+            outcome, is_known = self._look_again(station, scene, subgoal, outcome)
+            is_fair = is_fair and is_known
         self.experts.end_trial(outcome, is_fair=is_fair)
         self._stopwatch.lap("training")
         attempt = Attempt(
@@ -307,9 +315,42 @@ class Agent:
                 return TrialOutcome.BLOCKED, step
         return TrialOutcome.BLOCKED if is_blocked else TrialOutcome.NOT_REACHED, protocol.steps
 
+    def _look_again(
+        self, station: Station, scene: _Scene, subgoal: int, outcome: TrialOutcome
+    ) -> tuple[TrialOutcome, bool]:
+        """Move away until it is seen what the trial came to; return that, and whether it was seen.
+
+        Where the percept tells already, as ground truth always does, nothing is moved. A goal that cannot be seen even
+        so was not achieved, as far as is known, and its trial was no fair try: it is no evidence against the skill, and
+        no proof that something blocked it.
+        """
+        end, came_about = scene.percept, self._nothing
+        for way in ways_to_look(station.spec):
+            if self.judge.known(scene.percept, since_ns=end.stamp_ns)[subgoal]:
+                break
+            result = station.step(way)
+            if result.is_void:
+                return TrialOutcome.VOID, False
+            new = self._take_in(scene, result.percept)
+            came_about = tuple(was or is_so for was, is_so in zip(came_about, new, strict=True))
+        self._stopwatch.lap("stack")
+        if scene.percept is end:
+            return outcome, True
+        self.experts.notice(end, came_about)
+        if came_about[subgoal]:
+            return TrialOutcome.ACHIEVED, True
+        is_known = self.judge.known(scene.percept, since_ns=end.stamp_ns)[subgoal]
+        return outcome if is_known else TrialOutcome.NOT_REACHED, is_known
+
     def _take_in(self, scene: _Scene, percept: Percept) -> GoalState:
-        """Judge the goals, latch them and return those that came about in this very step."""
+        """Judge the goals, latch them and return those that came about in this very step.
+
+        A goal that nothing tells of holds if it held before: what is hidden has not changed, as far as is known.
+        """
         before, now = scene.holding, self.judge.achieved(percept)
+        known = self.judge.known(percept)
+        if not all(known):
+            now = tuple(new if is_known else old for new, old, is_known in zip(now, before, known, strict=True))
         scene.percept = percept
         if now == before:
             return self._nothing

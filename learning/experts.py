@@ -152,9 +152,20 @@ class ExpertSet:
             return
         if self._n_steps % REMEMBER_EVERY == 0:
             self._memory.add(self._trace[-1])
+        self._note_achieved(result.percept, achieved)
+
+    def notice(self, percept: Percept, achieved: GoalState) -> None:
+        """Take in what turned out, on looking again, to have come about by the step that ended with a percept.
+
+        The trace ends there: what was moved since was moved to see, and led to nothing.
+        """
+        if self._is_learning and self._trace:
+            self._note_achieved(percept, achieved)
+
+    def _note_achieved(self, percept: Percept, achieved: GoalState) -> None:
         for goal, is_achieved in enumerate(achieved):
             if is_achieved:
-                self._came_about.append((goal, np.array(self._trace), np.array(result.percept.distances_m)))
+                self._came_about.append((goal, np.array(self._trace), np.array(percept.distances_m)))
 
     def end_trial(self, outcome: TrialOutcome, *, is_fair: bool = True) -> None:
         """Close the trial, learn what it showed and train.

@@ -53,6 +53,15 @@ class GoalJudge:
         """Return which goals hold now."""
         return tuple([test(goal, percept) for test, goal in self._tests])
 
+    def known(self, percept: Percept, *, since_ns: int | None = None) -> GoalState:
+        """Return of which goals it is known whether they hold.
+
+        Args:
+            percept: what is perceived now.
+            since_ns: what was seen before, by the percept's clock, does not count; None lets all count that is valid.
+        """
+        return tuple([self._is_known(goal, percept, since_ns) for goal in self._goals])
+
     def is_at_place(self, goal: int, percept: Percept) -> bool:
         """Whether the tool is where a goal should come about, with a hand that is free for it.
 
@@ -86,6 +95,16 @@ class GoalJudge:
         near = [(math.dist(tool, self._find(name, percept).position_m), name) for name in self._loose]
         distance, name = min(near, default=(math.inf, ""))
         return name if distance < IN_HAND_M else None
+
+    def _is_known(self, goal: Goal, percept: Percept, since_ns: int | None) -> bool:
+        if goal.kind is GoalKind.PRESSED:
+            i = self._n_distances + self._buttons[goal.object]
+            return percept.valid[i] and _is_since(percept, percept.ages_s[i], since_ns)
+        if goal.kind is GoalKind.GRABBED and not percept.grip.has_object:
+            return True  # a hand that feels nothing holds nothing
+        thing = self._find(goal.object, percept)
+        is_thing_known = thing.is_valid and _is_since(percept, thing.age_s, since_ns)
+        return is_thing_known and (goal.box is None or self._find(goal.box, percept).is_valid)
 
     def _is_pressed(self, goal: Goal, percept: Percept) -> bool:
         i = self._buttons[goal.object]
@@ -127,3 +146,7 @@ class GoalJudge:
             self._index = {thing.name: k for k, thing in enumerate(percept.objects)}
             i = self._index[name]
         return percept.objects[i]
+
+
+def _is_since(percept: Percept, age_s: float, since_ns: int | None) -> bool:
+    return since_ns is None or percept.stamp_ns - round(age_s * 1e9) >= since_ns

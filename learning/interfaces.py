@@ -109,6 +109,10 @@ class Experts(Kept, Protocol):
         """Take in what the step came to; achieved tells every goal that came about in this very step."""
         ...
 
+    def notice(self, percept: Percept, achieved: GoalState) -> None:
+        """Take in what turned out, on looking again, to have come about by the step that ended with a percept."""
+        ...
+
     def end_trial(self, outcome: TrialOutcome, *, is_fair: bool = True) -> None:
         """Close the trial and, when learning, train. A miss that was no fair try says nothing against the skill."""
         ...

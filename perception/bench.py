@@ -8,10 +8,10 @@ from config.resolved import Resolved
 from perception.calibrated import calibrated, printed
 from perception.calibration.board import Board
 from perception.calibration.camera_file import CameraFile
-from perception.detection import ColourFile, Detector, learn_colours
+from perception.detection import ColourFile, Detector
 from perception.detection.arm_outline import arm_outlines
 from perception.detection.eye import Eye
-from perception.detection.regions import Region
+from perception.preparing import STUDIO, learnt
 from perception.scoring import Score, f1_of, percentile, score, total, upper_bound
 from robot.bench import BenchReport, BenchResult, bench_report
 from robot.description import forward_kinematics
@@ -21,8 +21,6 @@ from robot.rigs import load
 
 __all__ = ["FIRST_SEED", "bench_perception", "level_results", "overall_results"]
 
-STUDIO = "sim_twin.studio:open_studio"
-"""Who takes the pictures, by name: neither room knows the other."""
 LEVELS = ("clean", "mild", "medium", "strong")
 FIRST_SEED = 1_000_000
 """Pictures of seeds from 800,000 to 899,999 were looked at while thresholds were chosen, 900,001 is the guided
@@ -51,16 +49,6 @@ def bench_perception(*, full: bool) -> BenchReport:
     for level, came in scores.items():
         results += level_results(level, came)
     return bench_report("perception", results, seconds=perf_counter() - begun)
-
-
-def learnt(studio: Photographer, camera: CameraFile, resolved: Resolved) -> ColourFile:
-    """Return the colours of a studio's guided sample."""
-    sample = studio.sample()
-    frames = {str(number): photograph.frame for number, (photograph, _) in enumerate(sample)}
-    regions = [
-        Region.named(image=str(number), region=region) for number, (_, named) in enumerate(sample) for region in named
-    ]
-    return learn_colours(frames, regions, camera=camera, scenario=resolved.scenario)
 
 
 class _Looker:

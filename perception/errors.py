@@ -1,8 +1,8 @@
 """Errors of the perception room, in families by who must act."""
 
-from robot.errors import RobotConfigError, RobotError
+from robot.errors import RobotConfigError, RobotError, WireError
 
-__all__ = ["CalibrationRefusedError", "OpenCvMissingError", "PerceptionConfigError"]
+__all__ = ["CalibrationRefusedError", "CameraSilentError", "OpenCvMissingError", "PerceptionConfigError"]
 
 
 class PerceptionConfigError(RobotConfigError):
@@ -15,3 +15,7 @@ class OpenCvMissingError(PerceptionConfigError):
 
 class CalibrationRefusedError(RobotError):
     """What was gathered is not good enough to calibrate by: gather again, as the message says."""
+
+
+class CameraSilentError(WireError):
+    """A camera gives no picture any more, or none that shows anything: look after it."""

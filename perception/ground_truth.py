@@ -3,6 +3,7 @@
 import math
 
 from config.arm import ArmConfig
+from config.rig import Rig
 from config.scenario import Scenario
 from robot.errors import RobotConfigError
 from robot.messages import ArmState, ObjectPercept, Percept, SceneState
@@ -19,8 +20,8 @@ class GroundTruthPerception:
     of that thing in the scene; for the table, the height over it. s_i is the read-back of button i's lamp.
     """
 
-    def __init__(self, *, scenario: Scenario, arm: ArmConfig) -> None:
-        del arm  # every perception is made from the same two files; this one needs no tool
+    def __init__(self, *, scenario: Scenario, arm: ArmConfig, rig: Rig | None = None) -> None:
+        del arm, rig  # every perception is made from the same files; this one needs no tool and no camera
         self._distances = scenario.distances
         self._table_m = scenario.table.height_m
         self._lamp_bits = tuple(1 << button.lamp_output for button in scenario.buttons)

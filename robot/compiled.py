@@ -9,20 +9,37 @@ Inside there is no ValueError: the root of a negative number is not a number the
 """
 
 from collections.abc import Callable
-from typing import Any, TypeVar, cast, get_args, get_origin, get_type_hints
+from typing import Annotated, Any, TypeVar, cast, get_args, get_origin, get_type_hints
 
 import numba
 import numpy as np
 from numba import types
 from numpy.typing import NDArray
 
-__all__ = ["Table", "compiled"]
+__all__ = ["Bits2", "Bytes2", "Bytes3", "Floats2", "Floats3", "Table", "compiled"]
 
 Table = NDArray[np.float64]
 """Rows of numbers, contiguous: (n, m)."""
+Bytes2 = Annotated[NDArray[np.uint8], 2]
+"""A mask or one channel, contiguous: (h, w)."""
+Bytes3 = Annotated[NDArray[np.uint8], 3]
+"""A picture, contiguous: (h, w, 3)."""
+Bits2 = Annotated[NDArray[np.uint32], 2]
+"""A set of bits a pixel, contiguous: (h, w)."""
+Floats2 = Annotated[NDArray[np.float32], 2]
+"""A picture of numbers that need no more digits, contiguous: (h, w)."""
+Floats3 = Annotated[NDArray[np.float64], 3]
+"""Numbers of each pixel, contiguous: (h, w, n)."""
 
 Function = TypeVar("Function", bound=Callable[..., object])
 
+_ARRAYS = {
+    Bytes2: types.uint8,
+    Floats2: types.float32,
+    Bytes3: types.uint8,
+    Bits2: types.uint32,
+    Floats3: types.float64,
+}
 _SCALARS = {float: types.float64, int: types.int64, bool: types.boolean}
 
 
@@ -35,7 +52,7 @@ def compiled(function: Function) -> Function:
     Raises:
         TypeError: an annotation is none of these.
     """
-    hints = get_type_hints(function)
+    hints = get_type_hints(function, include_extras=True)
     result = _kind(hints.pop("return"))
     signature = result(*map(_kind, hints.values()))
     try:
@@ -49,6 +66,8 @@ def _kind(hint: Any) -> types.Type:  # noqa: ANN401 - whatever somebody wrote be
         return _SCALARS[hint]
     if hint == Table:
         return types.float64[:, ::1]
+    if hint in _ARRAYS:
+        return types.Array(_ARRAYS[hint], hint.__metadata__[0], "C")
     parts = get_args(hint)
     if get_origin(hint) is tuple and parts and ... not in parts:
         return types.Tuple([_kind(part) for part in parts])

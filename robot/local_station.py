@@ -27,7 +27,7 @@ from robot.messages import (
 )
 from robot.motion import Hand, HandReflexes
 from robot.safety import Answer, Arming, ArmingButton, Challenges, Lease, Reason, Tenure, draw_code
-from robot.station_doors import Loop, Perceives, World
+from robot.station_doors import Loop, Perceives, Sighted, World
 from robot.surroundings import Lookout, Surroundings
 from robot.tick_loop import Stride
 
@@ -168,6 +168,8 @@ class LocalStation:
         """Acquire the plant. Moves nothing. Idempotent."""
         if not self._is_connected:
             self._loop.connect()
+            if isinstance(self._perception, Sighted):
+                self._perception.connect()
             self._is_connected = True
 
     def take_lease(self, source: str, *, life_ns: int | None = None) -> Lease:
@@ -323,6 +325,8 @@ class LocalStation:
     def close(self) -> None:
         """Stop and release, connected to or not: the loop may hold more than an arm. Idempotent, never raises."""
         self._loop.close()
+        if isinstance(self._perception, Sighted):
+            self._perception.close()
         self._is_connected = False
         self._tenure.end()
 
@@ -351,6 +355,8 @@ class LocalStation:
     def _seed(self) -> Percept:
         """Start everything from the measured state."""
         state = self._loop.seed()
+        if isinstance(self._perception, Sighted):
+            self._perception.forget()
         percept = self._perceive(state)
         self._reflexes.reset(percept)
         return percept

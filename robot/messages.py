@@ -125,6 +125,9 @@ class ObjectPercept(Message, frozen=True, kw_only=True):
     quat: Quat
     age_s: float
     is_valid: bool
+    """False where it is not known where the thing is now: the place is where it was seen last, if it was."""
+    confidence: float = 1.0
+    """0 to 1."""
 
 
 class Percept(Message, frozen=True, kw_only=True):
@@ -139,6 +142,8 @@ class Percept(Message, frozen=True, kw_only=True):
     """Age of each entry of P(t), distances first."""
     valid: tuple[bool, ...]
     """Validity of each entry of P(t), distances first."""
+    confidences: tuple[float, ...] = ()
+    """0 to 1 for each entry of P(t), distances first; empty where all are sure."""
     objects: tuple[ObjectPercept, ...]
     tcp_position_m: Vec3
     grip: GripState

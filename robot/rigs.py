@@ -19,7 +19,7 @@ from robot.local_station import LocalStation
 from robot.motion import AskedHand
 from robot.own_senses import OwnSenses
 from robot.safety import Operator
-from robot.station_doors import Perceives
+from robot.station_doors import Perceives, Sighted
 from robot.tick_loop import TickLoop
 from robot.tick_tap import TickTap
 from robot.timed import time_world
@@ -97,6 +97,8 @@ def build_station(
     world = build_plant(rig=rig, arm=arm, scenario=scenario, cell=resolved.cell) if plant is None else plant
     if heard_by is not None:
         time_world(world, heard_by)
+    if isinstance(perception, Sighted):
+        perception.watch(world.cameras)
     loop = TickLoop(
         arm=world.arm, config=arm, scenario=scenario, rule_sets=resolved.rule_sets, rig=rig, profile=resolved.profile,
         tap=tap,
@@ -119,7 +121,8 @@ def find_station(
 ) -> "LocalStation | RemoteStation":
     """Return the station of a rig: of the robot node on its bus where there is one, else one of this process's own.
 
-    Where a person lays the table out it is this process's own, whose terminal he sits at. Ticks are tapped in an own one only.
+    Where a person lays the table out it is this process's own, whose terminal he sits at. Ticks
+    are tapped in an own one only.
     """
     rig = resolved.rig
     check_usable(rig)
@@ -143,7 +146,7 @@ def _perception_of(resolved: Resolved, *, is_driven: bool) -> Perceives:
     if is_driven and resolved.rig.perception is None:
         return OwnSenses()
     rig = resolved.rig
-    return _make(_require_perception(rig), "perception", scenario=resolved.scenario, arm=resolved.arm)
+    return _make(_require_perception(rig), "perception", scenario=resolved.scenario, arm=resolved.arm, rig=rig)
 
 
 def check_usable(rig: Rig) -> None:

@@ -1,13 +1,14 @@
 """What a station needs of others: of perception, of a plant besides its arm, and of what holds the arm."""
 
-from typing import Protocol
+from collections.abc import Mapping
+from typing import Protocol, runtime_checkable
 
-from robot.hal.protocols import Resetter, SceneTruth
+from robot.hal.protocols import Camera, Resetter, SceneTruth
 from robot.messages import ArmState, GripCommand, Intent, Percept, PlantIdentity, SceneState, Vec3
 from robot.surroundings import Surroundings
 from robot.tick_loop import Stride
 
-__all__ = ["Holder", "Loop", "Perceives", "World"]
+__all__ = ["Holder", "Loop", "Perceives", "Sighted", "World"]
 
 
 class Perceives(Protocol):
@@ -15,6 +16,27 @@ class Perceives(Protocol):
 
     def perceive(self, arm: ArmState, scene: SceneState | None) -> Percept:
         """Return the percept at the arm's stamp."""
+        ...
+
+
+@runtime_checkable
+class Sighted(Protocol):
+    """A perception that looks through a plant's cameras."""
+
+    def watch(self, cameras: Mapping[str, Camera]) -> None:
+        """Take the cameras to look through."""
+        ...
+
+    def connect(self) -> None:
+        """Acquire them. Raises WireError where there is none."""
+        ...
+
+    def forget(self) -> None:
+        """Begin anew: the table was laid out by somebody."""
+        ...
+
+    def close(self) -> None:
+        """Release them. Idempotent, never raises."""
         ...
 
 

@@ -1,7 +1,7 @@
 """The twin: the Plant door in front of MuJoCo, in lock-step."""
 
 import hashlib
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 
 import mujoco
 import numpy as np
@@ -55,6 +55,8 @@ class TwinWorld:
         self.table = TableDrive(self.model, self.data, scenario, tick_s=rig.tick_s)
         self.n_substeps = round(rig.tick_s / rig.physics_s)
         self.step_physics = mujoco.mj_step  # a bench puts a stopwatch here
+        self.after_tick: Callable[[], object] | None = None
+        """Called when a tick's physics is done: what looks at the world as it goes by."""
         self.clock = LockStepClock(tick_s=rig.tick_s, advance=self.advance)
         self.digital_out = 0
         self.opening_asked_m = arm.tool.stroke_m
@@ -81,6 +83,8 @@ class TwinWorld:
             self._ramp_down(self.stop_speed_rad_s)
         self.table.drive(self.data, self.digital_out)
         self.step_physics(self.model, self.data, self.n_substeps)
+        if self.after_tick is not None:
+            self.after_tick()
 
     def limit_grip(self, force_n: float) -> None:
         """Let the hand press with so much at most (N)."""

@@ -9,6 +9,7 @@ import numpy as np
 from msgspec import Meta
 from numpy.typing import NDArray
 
+from robot.compiled import Bytes3, Floats3, compiled
 from robot.errors import WireError
 from robot.frames import CameraSpec, Frame, frame_of
 from sim_twin.lens import TrueLens, directions, half_angles, source_map
@@ -93,6 +94,11 @@ class RenderedCamera:
         self._waiting.clear()
         self._n_taken, self._next_ns = 0, -1
 
+    def restart(self, rng: np.random.Generator) -> None:
+        """Forget what was taken, and draw anew at the next read, with other noise: nothing before is remembered."""
+        self._waiting.clear()
+        self._next_ns, self._rng = -1, rng
+
     def adjust(self, *, optics: Optics, T_bc: NDArray[np.float64], rng: np.random.Generator) -> None:
         """Take the frames to come through another path of light, from another place, with other noise.
 
@@ -174,19 +180,25 @@ class RenderedCamera:
             eye.frustum_center, eye.frustum_width = 0.0, half_x * NEAR_M
             eye.frustum_bottom, eye.frustum_top = -half_y * NEAR_M, half_y * NEAR_M
             eye.frustum_near, eye.frustum_far = NEAR_M, FAR_M
-        return renderer.render()
+        return np.ascontiguousarray(renderer.render())
 
 
-def sampled(picture: NDArray[np.uint8], places: NDArray[np.float64]) -> NDArray[np.float64]:
+@compiled
+def sampled(picture: Bytes3, places: Floats3) -> Floats3:
     """Return a picture's colours between pixels, bilinear.  (h, w, 3), (m, n, 2) x and y -> (m, n, 3)"""
-    height, width, _ = picture.shape
-    x = np.clip(places[..., 0], 0.0, width - 1.001)
-    y = np.clip(places[..., 1], 0.0, height - 1.001)
-    left, upper = x.astype(int), y.astype(int)
-    u, v = (x - left)[..., None], (y - upper)[..., None]
-    above = picture[upper, left] * (1.0 - u) + picture[upper, left + 1] * u
-    below = picture[upper + 1, left] * (1.0 - u) + picture[upper + 1, left + 1] * u
-    return above * (1.0 - v) + below * v
+    height, width, n_channels = picture.shape
+    found = np.empty((places.shape[0], places.shape[1], n_channels))
+    for i in range(places.shape[0]):
+        for j in range(places.shape[1]):
+            x = min(max(places[i, j, 0], 0.0), width - 1.001)
+            y = min(max(places[i, j, 1], 0.0), height - 1.001)
+            left, upper = int(x), int(y)
+            u, v = x - left, y - upper
+            for k in range(n_channels):
+                above = picture[upper, left, k] * (1.0 - u) + picture[upper, left + 1, k] * u
+                below = picture[upper + 1, left, k] * (1.0 - u) + picture[upper + 1, left + 1, k] * u
+                found[i, j, k] = above * (1.0 - v) + below * v
+    return found
 
 
 def develop(light: NDArray[np.float64], optics: Optics, rng: np.random.Generator) -> NDArray[np.uint8]:

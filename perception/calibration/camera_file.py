@@ -7,7 +7,7 @@ import msgspec
 from msgspec import Meta
 
 from config.decode import decode
-from config.sources import read_path
+from config.sources import read_path, read_source
 from config.values import Name, NonNegative, Point, Section
 from config.yaml_text import dump_yaml, parse_yaml
 from perception.calibration.board import Board, check_board
@@ -79,13 +79,13 @@ class CameraFile(Section, frozen=True, kw_only=True):
     verified: Verification | None = None
 
 
-def load_camera(path: Path) -> CameraFile:
-    """Return a camera's file.
+def load_camera(name: str | Path) -> CameraFile:
+    """Return a camera's file: a shipped one's name, or a path.
 
     Raises:
         ConfigError: it cannot be read or is wrong.
     """
-    source = read_path(path)
+    source = read_source("cameras", name)
     return decode(parse_yaml(source.text, source.file), CameraFile, source.file)
 
 

@@ -70,9 +70,16 @@ def _block(low: tuple[float, float, float], high: tuple[float, float, float]) ->
 
 def _ball(centre: tuple[float, float, float], radius: float) -> Array:
     """Return points about a centre whose hull holds the ball but for a few hundredths of its radius."""
+    return np.array(centre) + radius * ROUND
+
+
+def _unit_ball() -> Array:
     turn = np.linspace(0.0, 2.0 * np.pi, N_ROUND, endpoint=False)
     rings = [
         np.column_stack([np.cos(lift) * np.cos(turn), np.cos(lift) * np.sin(turn), np.full(N_ROUND, np.sin(lift))])
         for lift in np.linspace(-np.pi / 2, np.pi / 2, 7)
     ]
-    return np.array(centre) + radius * np.concatenate(rings)
+    return np.concatenate(rings)
+
+
+ROUND = _unit_ball()

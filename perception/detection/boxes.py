@@ -6,14 +6,17 @@ import numpy as np
 from config.scenario import Box
 from perception.calibration.lens import Array
 from perception.detection.eye import Eye
-from perception.detection.outline import EdgeFit, Slopes, fit_edges
+from perception.detection.glance import Glance
+from perception.detection.outline import EdgeFit, fit_edges, fit_edges_near
 from perception.detection.seen import LidSeen, LidState, Stance, ThingSeen
 from perception.detection.solids import Edges, Solid, box_edges, box_solids, moved
+from robot.messages import Vec3
 
 __all__ = ["BoxFinder", "BoxFound"]
 
 SLACK_M = 0.008
 """How far out of its region of the scenario a box is looked for."""
+AROUND_PX = 6
 LEAST_SUPPORT = 0.5
 LEAST_MARGIN = 0.06
 """By so much the edges of one state must fit better than those of the other."""
@@ -38,14 +41,39 @@ class BoxFinder:
         states = {LidState.SHUT: 0.0} if box.lid is None else {
             LidState.SHUT: 0.0, LidState.OPEN: box.lid.open_angle_rad
         }  # fmt: skip
-        self._angles = states
+        self._solids_by_state = {
+            state: box_solids(box, lid_rad=None if box.lid is None else angle) for state, angle in states.items()
+        }
         self._edges: dict[LidState, Edges] = {
             state: box_edges(box, lid_rad=angle, eye_m=eye.position_m - self._middle) for state, angle in states.items()
         }
+        self._low, self._high = self._region()
 
-    def find(self, slopes: Slopes) -> BoxFound:
-        """Return where the box is and how its lid is."""
-        fits = {s: fit_edges(self._eye, e, self._middle, slopes, reach_m=self._reach_m) for s, e in self._edges.items()}
+    @property
+    def name(self) -> str:
+        """The box's."""
+        return self._box.name
+
+    def find(self, seen: Glance, near: Vec3 | None = None) -> BoxFound:
+        """Return where the box is and how its lid is.
+
+        Args:
+            seen: the picture.
+            near: where the box was seen before: it is looked for there, and elsewhere only if it is not there.
+        """
+        field = seen.smooth(self._low, self._high)
+        if near is not None:
+            at = np.array([near[0], near[1], self._table_m])
+            found = self._told({s: fit_edges_near(self._eye, e, at, field) for s, e in self._edges.items()})
+            if found.thing.position_m is not None:
+                return found
+        reach = self._reach_m
+        return self._told(
+            {s: fit_edges(self._eye, e, self._middle, field, reach_m=reach) for s, e in self._edges.items()}
+        )
+
+    def _told(self, fits: dict[LidState, EdgeFit | None]) -> BoxFound:
+        """Return what the fits of both states tell."""
         found = {s: fit for s, fit in fits.items() if fit is not None}
         if not found:
             return self._unseen()
@@ -63,6 +91,14 @@ class BoxFinder:
             return msgspec.structs.replace(self._unseen(), lid=lid)
         return BoxFound(thing=self._thing(best), lid=lid, solids=self._solids(best, state))
 
+    def _region(self) -> tuple[Array, Array]:
+        """Return the corners of all pixels that its edges can be at.  -> 2 x (2,)"""
+        reach = self._reach_m
+        moves = [self._middle + np.array([i * reach, j * reach, 0.0]) for i in (-1, 1) for j in (-1, 1)]
+        pixels = [self._eye.pixels(edges.points_m + move) for edges in self._edges.values() for move in moves]
+        around = np.concatenate(pixels)
+        return np.nanmin(around, axis=0) - AROUND_PX, np.nanmax(around, axis=0) + AROUND_PX
+
     def _thing(self, fit: EdgeFit) -> ThingSeen:
         return ThingSeen(
             name=self._box.name, position_m=(*fit.position_m, self._table_m), stance=Stance.FIXED, axis_rad=None,
@@ -71,8 +107,7 @@ class BoxFinder:
 
     def _solids(self, fit: EdgeFit, state: LidState) -> tuple[Solid, ...]:
         at: Array = np.array([*fit.position_m, self._table_m])
-        angle = None if self._box.lid is None else self._angles[state]
-        return tuple(moved(solid, at) for solid in box_solids(self._box, lid_rad=angle))
+        return tuple(moved(solid, at) for solid in self._solids_by_state[state])
 
     def _unseen(self) -> BoxFound:
         thing = ThingSeen(

@@ -7,7 +7,7 @@ from config.scenario import Button
 from perception.calibration.lens import Array
 from perception.detection.colours import features
 from perception.detection.eye import Eye
-from perception.detection.glance import Glance
+from perception.detection.glance import Glance, mask_of
 from perception.detection.hiding import Hiders
 from perception.detection.seen import Stance, ThingSeen
 from perception.detection.shapes import CIRCLE, cap_points, hull, stamp
@@ -50,13 +50,16 @@ class ButtonFinder:
         low = np.maximum(self._low - seen.origin, 0).astype(int)
         high = np.maximum(self._high - seen.origin, 0).astype(int)
         window = seen.labels[low[1] : high[1], low[0] : high[0]]
-        mask = ((window & np.uint32(self._bit)) != 0).astype(np.uint8)
+        mask = mask_of(window, self._bit)
         rows, columns = np.nonzero(mask)
         if len(rows) == 0:
             return ButtonFound(thing=self._unseen(0.0), reading=None)
         origin = seen.origin + low
         cap_m = self._table_m + self._button.height_m - self._button.cap_m / 2.0
-        start = self._eye.on_plane(np.array([[columns.mean(), rows.mean()]]) + origin, cap_m)[0]
+        u, v = float(columns.mean() + origin[0]), float(rows.mean() + origin[1])
+        start = self._eye.spot(u, v, cap_m)
+        if not np.isfinite(start).all():
+            return ButtonFound(thing=self._unseen(0.0), reading=None)
         start[2] = self._table_m
         hidden = hiders.before(start + self._body)
         fit = fit_silhouette(self._eye, self._body, start, mask, origin, hidden)

@@ -8,7 +8,7 @@ import numpy as np
 from msgspec import Meta
 
 from config.decode import decode
-from config.sources import read_path
+from config.sources import read_source
 from config.values import Name, NonNegative, Positive, Section
 from config.yaml_text import dump_yaml, parse_yaml
 from perception.calibration.lens import Array
@@ -80,13 +80,13 @@ def models_of(colours: ColourFile, name: str) -> tuple[ColourModel, ...]:
     return found
 
 
-def load_colours(path: Path) -> ColourFile:
-    """Return what was learnt.
+def load_colours(name: str | Path) -> ColourFile:
+    """Return what was learnt: a shipped file's name, or a path.
 
     Raises:
         ConfigError: it cannot be read or is wrong.
     """
-    source = read_path(path)
+    source = read_source("colours", name)
     return decode(parse_yaml(source.text, source.file), ColourFile, source.file)
 
 

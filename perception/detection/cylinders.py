@@ -6,12 +6,13 @@ from numpy.typing import NDArray
 from config.scenario import Cylinder
 from perception.calibration.lens import Array
 from perception.detection.eye import Eye
-from perception.detection.glance import Glance
+from perception.detection.glance import Glance, mask_of
 from perception.detection.hiding import Hiders
 from perception.detection.seen import Stance, ThingSeen
 from perception.detection.shapes import hull, lying_points, standing_points
 from perception.detection.silhouette import Fit, fit_silhouette
 from perception.opencv import opencv
+from robot.messages import Vec3
 
 __all__ = ["CylinderFinder"]
 
@@ -24,6 +25,8 @@ LEAST_LEAD = 0.04
 LEAST_PATCH = 0.15
 """Share of a cylinder's own area that a patch must have."""
 N_PATCHES = 3
+REACH = 1.2
+"""What was seen somewhere is looked for this many of its diagonals about it."""
 N_AXES = 6
 
 
@@ -33,11 +36,30 @@ class CylinderFinder:
     def __init__(self, cylinder: Cylinder, table_m: float, eye: Eye, bit: int) -> None:
         self._cylinder, self._eye, self._bit, self._table_m = cylinder, eye, bit, table_m
         self._standing = standing_points(cylinder)
+        reach = REACH * float(np.hypot(cylinder.diameter_m, cylinder.height_m))
+        self._about = np.array([[i, j, k] for i in (-1, 1) for j in (-1, 1) for k in (-1, 1)]) * reach
 
-    def find(self, seen: Glance, hiders: Hiders) -> ThingSeen:
-        """Return where the cylinder is; unknown where nothing of its colour has its shape."""
-        mask = seen.mask(self._bit)
-        things = [self._try(part, origin, hiders) for part, origin in self._patches(mask, seen.origin)]
+    @property
+    def name(self) -> str:
+        """The cylinder's."""
+        return self._cylinder.name
+
+    def find(self, seen: Glance, hiders: Hiders, near: Vec3 | None = None) -> ThingSeen:
+        """Return where the cylinder is; unknown where nothing of its colour has its shape.
+
+        Args:
+            seen: the picture.
+            hiders: what stands before it.
+            near: where the cylinder was seen before: it is looked for there alone.
+        """
+        low, high = seen.origin, seen.origin + np.array(seen.labels.shape[::-1])
+        if near is not None:
+            around = self._eye.pixels(np.array(near) + self._about)
+            low, high = around.min(axis=0), around.max(axis=0)
+        (left, upper), (right, lower) = seen.part(low, high)
+        mask = mask_of(seen.labels[upper:lower, left:right], self._bit)
+        origin = seen.origin + np.array([left, upper])
+        things = [self._try(part, first, hiders) for part, first in self._patches(mask, origin)]
         told = [thing for thing in things if thing is not None]
         return max(told, key=lambda thing: thing.confidence * thing.visible, default=self._unseen())
 
@@ -59,7 +81,7 @@ class CylinderFinder:
 
     def _area_px(self, middle: Array) -> float:
         """Return how many pixels a standing cylinder has there."""
-        at = self._eye.on_plane(middle[None, :], self._table_m)[0]
+        at = self._eye.spot(float(middle[0]), float(middle[1]), self._table_m)
         outline = hull(self._eye.pixels(at + self._standing))
         x, y = outline.T
         return float(abs(x @ np.roll(y, 1) - y @ np.roll(x, 1)) / 2.0)
@@ -102,8 +124,8 @@ class CylinderFinder:
 
     def _fit(self, body: Array, patch: NDArray[np.uint8], origin: Array, hiders: Hiders) -> Fit | None:
         rows, columns = np.nonzero(patch)
-        middle = np.array([[columns.mean(), rows.mean()]]) + origin
-        start = self._eye.on_plane(middle, self._table_m + float(body[:, 2].max()) / 2.0)[0]
+        u, v = float(columns.mean() + origin[0]), float(rows.mean() + origin[1])
+        start = self._eye.spot(u, v, self._table_m + float(body[:, 2].max()) / 2.0)
         if not np.isfinite(start).all():
             return None
         start[2] = self._table_m

@@ -1,6 +1,7 @@
 """Everything that a scenario names, in one picture of a calibrated camera."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 
 import numpy as np
 
@@ -19,6 +20,7 @@ from perception.detection.palette import Palette
 from perception.detection.seen import Detections, LampSeen, LampState, LidSeen, LidState, Stance, ThingSeen
 from perception.errors import PerceptionConfigError
 from robot.frames import Frame, picture_of
+from robot.messages import Vec3
 
 __all__ = ["Detector"]
 
@@ -48,12 +50,15 @@ class Detector:
         self._cylinders = [CylinderFinder(c, table_m, self._eye, bit(c.name)) for c in scenario.cylinders]
         self._lamp_by_name = {lamp.name: lamp for lamp in colours.lamps}
 
-    def look(self, frame: Frame, before: Sequence[Array] = ()) -> Detections:
+    def look(
+        self, frame: Frame, before: Sequence[Array] = (), near: Mapping[str, Vec3] = MappingProxyType({})
+    ) -> Detections:
         """Return what a picture shows.
 
         Args:
             frame: the picture.
             before: convex polygons of pixels that are known to be the arm's.  each (n, 2)
+            near: where things were seen before; a loose one of these is looked for there alone.
 
         Raises:
             PerceptionConfigError: a picture of another size than the camera's file says.
@@ -67,10 +72,10 @@ class Detector:
         seen = glance(picture_of(frame), self._field, self._palette, np.array(self._colours.table_rgb))
         if seen is None:
             return self._nothing(frame.stamp_ns)
-        boxes = [finder.find(seen.slopes) for finder in self._boxes]
+        boxes = [finder.find(seen, near.get(finder.name)) for finder in self._boxes]
         hiders = Hiders(self._eye, [solid for box in boxes for solid in box.solids], before)
         buttons = [finder.find(seen, hiders) for finder in self._buttons]
-        cylinders = [finder.find(seen, hiders) for finder in self._cylinders]
+        cylinders = [finder.find(seen, hiders, near.get(finder.name)) for finder in self._cylinders]
         return Detections(
             stamp_ns=frame.stamp_ns,
             things=(*(b.thing for b in buttons), *(b.thing for b in boxes), *cylinders),
@@ -83,7 +88,7 @@ class Detector:
         seen = glance(picture_of(frame), self._field, self._palette, np.array(self._colours.table_rgb))
         if seen is None:
             return {}
-        solids = [solid for finder in self._boxes for solid in finder.find(seen.slopes).solids]
+        solids = [solid for finder in self._boxes for solid in finder.find(seen).solids]
         found = [finder.find(seen, Hiders(self._eye, solids)) for finder in self._buttons]
         return {b.thing.name: b.reading for b in found if b.reading is not None}
 
@@ -96,7 +101,7 @@ class Detector:
         scenario = self._scenario
         things = (*scenario.buttons, *scenario.boxes, *scenario.cylinders)
         return Detections(
-            stamp_ns=stamp_ns,
+            stamp_ns=stamp_ns, is_lit=False,
             things=tuple(
                 ThingSeen(
                     name=t.name, position_m=None, stance=Stance.UNKNOWN, axis_rad=None, confidence=0.0, visible=0.0

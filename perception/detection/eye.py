@@ -3,8 +3,9 @@
 import numpy as np
 
 from perception.calibration.camera_file import CameraFile
-from perception.calibration.lens import Array, Lens, intersect_height, project, rays
-from perception.calibration.poses import carried, inverse, matrix_of
+from perception.calibration.lens import Array, Lens, intersect_height, rays
+from perception.calibration.poses import inverse, matrix_of
+from perception.detection.kernels import lens_numbers, on_plane, pixels_of
 from perception.errors import PerceptionConfigError
 
 __all__ = ["Eye"]
@@ -26,7 +27,10 @@ class Eye:
             )
         self.lens: Lens = camera.lens
         self.T_bc = matrix_of(camera.extrinsics.pose)
-        self._T_cb = inverse(self.T_bc)
+        self.T_cb = np.ascontiguousarray(inverse(self.T_bc))
+        self.numbers = lens_numbers(camera.lens)
+        x, y, _ = self.on_plane(np.array([[camera.lens.cx_px, camera.lens.cy_px]]), 0.0)[0].tolist()
+        self._ahead = (x, y)
 
     @property
     def position_m(self) -> Array:
@@ -35,11 +39,16 @@ class Eye:
 
     def pixels(self, points_b: Array) -> Array:
         """Return where points of the base frame are seen, NaN for what is behind.  (n, 3) m -> (n, 2) px"""
-        return project(self.lens, carried(self._T_cb, points_b))
+        return pixels_of(self.numbers, self.T_cb, np.ascontiguousarray(points_b))
 
     def on_plane(self, pixels: Array, height_m: float) -> Array:
         """Return where the pixels' rays meet the plane at a height.  (n, 2) px -> (n, 3) m"""
         return intersect_height(self.T_bc, rays(self.lens, pixels), height_m)
+
+    def spot(self, u: float, v: float, height_m: float) -> Array:
+        """Return where one pixel's ray meets the plane at a height, not numbers where it does not.  -> (3,) m"""
+        x, y = on_plane(self.numbers, self.T_cb, u, v, (self._ahead[0], self._ahead[1], height_m))
+        return np.array([x, y, height_m])
 
     def slope(self, point_b: Array) -> Array:
         """Return how a point's pixel moves with the point along x and y.  (3,) m -> (2, 2) px/m"""

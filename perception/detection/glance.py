@@ -9,13 +9,12 @@ from perception.calibration.lens import Array
 from perception.detection.colours import GREY_WEIGHTS
 from perception.detection.eye import Eye
 from perception.detection.light import EVERY_PX, gains, table_light
-from perception.detection.outline import Slopes, slopes
+from perception.detection.outline import Smooth, smooth
 from perception.detection.palette import Palette
 from perception.detection.shapes import hull, stamp
-from perception.opencv import opencv
 from robot.frames import Picture
 
-__all__ = ["Field", "Glance", "glance"]
+__all__ = ["Field", "Glance", "glance", "mask_of"]
 
 MARGIN_M = 0.10
 """What stands at the workspace's edge reaches out of it."""
@@ -64,14 +63,26 @@ class Glance(msgspec.Struct, frozen=True, kw_only=True):
 
     rgb: NDArray[np.uint8]
     labels: NDArray[np.uint32]
-    slopes: Slopes
     origin: Array
     gains: Array
     light: Array
 
-    def mask(self, bit: int) -> NDArray[np.uint8]:
-        """Return 1 where a thing's colour is.  -> (h, w)"""
-        return ((self.labels & np.uint32(bit)) != 0).astype(np.uint8)
+    def part(self, low: Array, high: Array) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Return the first pixel of a part of the field and the one past its last, about pixels of the picture."""
+        size = np.array(self.labels.shape[::-1])
+        first = np.clip(np.floor(low - self.origin).astype(np.int64), 0, size)
+        return first, np.clip(np.ceil(high - self.origin).astype(np.int64), first, size)
+
+    def smooth(self, low: Array, high: Array) -> Smooth:
+        """Return the grey of the field between two pixels of the picture."""
+        (left, upper), (right, lower) = self.part(low, high)
+        origin = self.origin + np.array([left, upper])
+        return smooth(self.rgb[upper:lower, left:right], origin, float(self.light @ GREY_WEIGHTS))
+
+
+def mask_of(labels: NDArray[np.uint32], bit: int) -> NDArray[np.uint8]:
+    """Return 1 where a thing's colour is.  (h, w) -> (h, w)"""
+    return ((labels & np.uint32(bit)) != 0).astype(np.uint8)
 
 
 def glance(picture: Picture, field: Field, palette: Palette, reference_rgb: Array) -> Glance | None:
@@ -79,13 +90,11 @@ def glance(picture: Picture, field: Field, palette: Palette, reference_rgb: Arra
     light = table_light(picture, field.table)
     if light is None:
         return None
-    rgb = np.ascontiguousarray(picture[field.upper : field.lower, field.left : field.right])
+    rgb = picture[field.upper : field.lower, field.left : field.right].copy()
     gain = gains(light, reference_rgb)
-    grey = opencv().transform(rgb, GREY_WEIGHTS[None, :])
     return Glance(
         rgb=rgb,
         labels=palette.label(rgb, gain),
-        slopes=slopes(grey, field.origin, float(light @ GREY_WEIGHTS)),
         origin=field.origin,
         gains=gain,
         light=light,

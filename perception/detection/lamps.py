@@ -51,6 +51,11 @@ class Debounce:
         self._other = LampState.UNKNOWN
         self.state = LampState.UNKNOWN
 
+    def begin(self, state: LampState) -> LampState:
+        """Believe a state from now on, and return it: where nothing was known, nothing speaks against it."""
+        self.state, self._n = state, 0
+        return state
+
     def note(self, seen: LampState) -> LampState:
         """Take one picture's state and return the one that holds."""
         if seen is LampState.UNKNOWN:

@@ -7,6 +7,7 @@ from config.scenario import Scenario
 from perception.calibration.lens import Array
 from perception.detection.colour_file import ColourFile, distances
 from perception.detection.colours import features
+from robot.compiled import Bits2, Bytes3, compiled
 
 __all__ = ["Palette"]
 
@@ -34,24 +35,35 @@ class Palette:
         boxes, loose = {b.name for b in scenario.boxes}, {c.name for c in scenario.cylinders}
         behind = _nearest([d for m, d in apart.items() if m.name not in boxes | named.keys()], len(cube))
         behind_loose = np.minimum(behind, _nearest([d for m, d in apart.items() if m.name in boxes], len(cube)))
-        self._bits = np.zeros(len(cube), np.uint32)
+        bits = np.zeros(len(cube), np.uint32)
         for model, d in apart.items():
             if model.name in named:
                 rival = behind_loose if model.name in loose else behind
-                self._bits[(d < FARTHEST) & (d < rival)] |= named[model.name]
+                bits[(d < FARTHEST) & (d < rival)] |= named[model.name]
+        self._bits = bits.reshape(1, -1)
         self._bit_by_name = named
 
     def label(self, picture: NDArray[np.uint8], gains: Array) -> NDArray[np.uint32]:
         """Return the bits of each pixel, its channels multiplied by gains first.  (h, w, 3), (3,) -> (h, w)"""
-        index = np.zeros(picture.shape[:2], np.int32)
-        for channel, gain in enumerate(gains):
-            level = np.clip(np.arange(256) * gain / 256.0 * N, 0, N - 1).astype(np.int32)
-            index += level[picture[..., channel]] << (BITS * (2 - channel))
-        return self._bits[index]
+        levels = np.minimum(np.arange(256)[:, None] * gains / 256.0 * N, N - 1).astype(np.uint32)
+        shifted = np.ascontiguousarray(levels << np.array([2 * BITS, BITS, 0], np.uint32))
+        return labelled(picture, shifted, self._bits)
 
     def bit(self, name: str) -> int:
         """Return a button's or cylinder's bit."""
         return self._bit_by_name[name]
+
+
+@compiled
+def labelled(picture: Bytes3, levels: Bits2, bits: Bits2) -> Bits2:
+    """Return the bits of each pixel: its channels' levels (256, 3) say together where in a row of bits to look."""
+    height, width, _ = picture.shape
+    found = np.empty((height, width), np.uint32)
+    for i in range(height):
+        for j in range(width):
+            k = levels[picture[i, j, 0], 0] + levels[picture[i, j, 1], 1] + levels[picture[i, j, 2], 2]
+            found[i, j] = bits[0, k]
+    return found
 
 
 def _nearest(distances: list[Array], n: int) -> Array:

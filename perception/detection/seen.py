@@ -73,3 +73,5 @@ class Detections(Message, frozen=True, kw_only=True):
     things: tuple[ThingSeen, ...]
     lamps: tuple[LampSeen, ...]
     lids: tuple[LidSeen, ...]
+    is_lit: bool = True
+    """Whether the table's light could be told: nothing is known of a picture that is black, full or covered."""

@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from config.scenario import Button, Cylinder
 from perception.calibration.lens import Array
-from perception.opencv import opencv
+from perception.detection.kernels import hull_of, paint_hull
 
 __all__ = ["cap_points", "hull", "lying_points", "stamp", "standing_points"]
 
@@ -14,8 +14,6 @@ DOME_STEPS = (0.35, 0.65, 0.87, 1.0)
 """Heights on a dome, as shares of it, whose circles are drawn."""
 ROUND = np.linspace(0.0, 2.0 * np.pi, N_ROUND, endpoint=False)
 CIRCLE = np.stack([np.cos(ROUND), np.sin(ROUND)], axis=1)
-SHIFT = 4
-"""Corners are drawn to a sixteenth of a pixel."""
 
 
 def cap_points(button: Button) -> Array:
@@ -43,13 +41,12 @@ def lying_points(cylinder: Cylinder, axis_rad: float) -> Array:
 
 def hull(pixels: Array) -> Array:
     """Return the convex hull of pixels.  (n, 2) -> (m, 2)"""
-    return opencv().convexHull(pixels.astype(np.float32)).reshape(-1, 2).astype(np.float64)
+    return hull_of(np.ascontiguousarray(pixels))
 
 
 def stamp(mask: NDArray[np.uint8], polygon: Array, origin: Array, value: int = 255) -> None:
     """Draw a convex polygon into a mask whose first pixel is at `origin`.  (h, w), (n, 2) px, (2,)"""
-    corners = np.round((polygon - origin) * (1 << SHIFT)).astype(np.int32)
-    opencv().fillConvexPoly(mask, corners, value, lineType=8, shift=SHIFT)
+    paint_hull(mask, polygon, float(origin[0]), float(origin[1]), value)
 
 
 def _ring(radius: float, height: float) -> Array:

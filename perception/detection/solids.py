@@ -66,7 +66,7 @@ def corners(solid: Solid) -> Array:
 
 def moved(solid: Solid, by_m: Array) -> Solid:
     """Return a block somewhere else.  (3,) m"""
-    return msgspec.structs.replace(solid, centre_m=solid.centre_m + by_m)
+    return Solid(centre_m=solid.centre_m + by_m, half_m=solid.half_m, R=solid.R)
 
 
 def hides(solid: Solid, eye_m: Array, points_m: Array) -> NDArray[np.bool_]:
@@ -92,7 +92,7 @@ def box_edges(box: Box, *, lid_rad: float | None, eye_m: Array) -> Edges:
         ahead.append(points[-1] + 0.25 * (end - start) / n)
     place, beside = np.concatenate(points), np.concatenate(ahead)
     is_hidden = np.any([hides(solid, eye_m, place) for solid in solids], axis=0)
-    return Edges(points_m=place[~is_hidden], ahead_m=beside[~is_hidden])
+    return Edges(points_m=np.ascontiguousarray(place[~is_hidden]), ahead_m=np.ascontiguousarray(beside[~is_hidden]))
 
 
 def _box_lines(box: Box, leaves: list[Solid], *, is_shut: bool) -> list[tuple[Array, Array]]:

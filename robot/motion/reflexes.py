@@ -165,8 +165,10 @@ class HandReflexes:
         self._command = command
 
     def _between_jaws(self, percept: Percept) -> _Loose | None:
-        """The loose thing whose centre lies between the pads, if any."""
+        """The loose thing whose centre lies between the pads, if any; of one that is not perceived now nobody knows."""
         for loose in self._loose:
+            if not self._thing(percept, loose.name).is_valid:
+                continue
             across, along, below = tool_offset(self._position_of(percept, loose), percept.tcp_position_m, self._yaw_rad)
             if (
                 abs(across) <= self._across_m

@@ -9,14 +9,16 @@ from numpy.typing import NDArray
 from robot.frames import CameraSpec, Frame
 from robot.photographs import BoardPhotograph, PrintedBoard
 from sim_twin.board_stage import Sheet, board_stage
+from sim_twin.lens import TrueLens
 from sim_twin.rendered_camera import Optics, RenderedCamera
-from sim_twin.studio.viewing import LENS
+from sim_twin.studio.viewing import View
 
 __all__ = ["photograph_boards"]
 
 Array = NDArray[np.float64]
 N_COLUMNS, N_ROWS = 4, 3
-DEPTH_M, TILT_RAD, SPIN_RAD = 0.42, 0.55, 0.5
+WIDE_M, TILT_RAD, SPIN_RAD = 0.5856, 0.55, 0.5
+"""The sheet is held where so much fills the picture's width, whatever the lens."""
 TOUCH_SD_M = 0.0003
 """Of a tip at a corner, each way."""
 LYING = ((0.33, -0.20, 0.3), (0.33, 0.20, -0.4), (0.58, 0.0, 1.4))
@@ -26,17 +28,18 @@ SEED = 910_001
 PERIOD_NS = 40_000_000
 
 
-def photograph_boards(board: PrintedBoard, spec: CameraSpec, T_bc: Array) -> Iterator[BoardPhotograph]:
+def photograph_boards(board: PrintedBoard, spec: CameraSpec, view: View) -> Iterator[BoardPhotograph]:
     """Give pictures for the lens, then pictures of the board at touched places of the table."""
+    T_bc = view.T_bc
     picture = np.frombuffer(board.pixels, np.uint8).reshape(board.height_px, board.width_px)
     model = board_stage([Sheet(picture=picture, size_m=board.size_m, T_bs=np.eye(4))])
     rng = np.random.default_rng(SEED)
     camera = RenderedCamera(
-        model=model, data=mujoco.MjData(model), spec=spec, lens=LENS, T_bc=T_bc, optics=OPTICS, rng=rng
+        model=model, data=mujoco.MjData(model), spec=spec, lens=view.lens, T_bc=T_bc, optics=OPTICS, rng=rng
     )
     camera.connect()
     try:
-        for number, T_cs in enumerate(_held_up(board, rng)):
+        for number, T_cs in enumerate(_held_up(board, view.lens, rng)):
             yield BoardPhotograph(frame=_shot(model, camera, T_bc @ T_cs, number), touches_m=())
         for number, (x, y, turn) in enumerate(LYING, N_COLUMNS * N_ROWS):
             T_bs = _lying(board, x, y, turn)
@@ -64,17 +67,18 @@ def _shot(model: mujoco.MjModel, camera: RenderedCamera, T_bs: Array, number: in
     return frame
 
 
-def _held_up(board: PrintedBoard, rng: np.random.Generator) -> Iterator[Array]:
+def _held_up(board: PrintedBoard, lens: TrueLens, rng: np.random.Generator) -> Iterator[Array]:
     """Give poses of the sheet in the camera's frame: all over the picture, tilted both ways, spun about.  (4, 4)"""
     middle = np.array([*board.size_m, 0.0]) / 2.0
+    depth_m = WIDE_M * lens.focal_px[0] / lens.width_px
     for i in range(N_COLUMNS * N_ROWS):
         share = np.array([0.15 + 0.7 * (i % N_COLUMNS) / (N_COLUMNS - 1), 0.2 + 0.6 * (i // N_COLUMNS) / (N_ROWS - 1)])
-        pixel = (share + rng.uniform(-0.03, 0.03, 2)) * (LENS.width_px, LENS.height_px)
-        way = (pixel - LENS.centre_px) / LENS.focal_px
+        pixel = (share + rng.uniform(-0.03, 0.03, 2)) * (lens.width_px, lens.height_px)
+        way = (pixel - lens.centre_px) / lens.focal_px
         a, b = rng.uniform(-TILT_RAD, TILT_RAD, 2)
         T = np.eye(4)
         T[:3, :3] = _about_x(a) @ _about_y(b) @ _about_z(float(rng.uniform(-SPIN_RAD, SPIN_RAD)))
-        T[:3, 3] = np.array([*way, 1.0]) * DEPTH_M * float(rng.uniform(0.9, 1.3)) - T[:3, :3] @ middle
+        T[:3, 3] = np.array([*way, 1.0]) * depth_m * float(rng.uniform(0.9, 1.3)) - T[:3, :3] @ middle
         yield T
 
 

@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from config.scenario import Box, Scenario
 from robot.messages import ObjectPose
 from robot.photographs import NamedRegion
-from sim_twin.studio.viewing import seen_at
+from sim_twin.studio.viewing import View
 
 __all__ = ["named_regions"]
 
@@ -17,13 +17,13 @@ INSIDE = 0.85
 
 
 def named_regions(
-    scenario: Scenario, objects: tuple[ObjectPose, ...], T_bc: Array, *, is_lit: bool
+    scenario: Scenario, objects: tuple[ObjectPose, ...], view: View, *, is_lit: bool
 ) -> tuple[NamedRegion, ...]:
     """Return polygons inside each cap and its base, each cylinder and box, and on free table.
 
     Lids are shut where the lamps are lit: what is in the boxes is named on the other picture.
     """
-    place = {o.name: np.array(o.position_m) for o in objects}
+    place, T_bc = {o.name: np.array(o.position_m) for o in objects}, view.T_bc
     polygons: list[tuple[str, str, Array]] = []
     for button in scenario.buttons:
         radius, cap = button.diameter_m / 2, place[button.name]
@@ -42,7 +42,7 @@ def named_regions(
     x, y = scenario.table.centre_m
     free = [[x + u, y + v, scenario.table.height_m] for u, v in ((0.28, -0.3), (0.28, 0.3), (0.36, 0.3), (0.36, -0.3))]
     polygons.append(("table", "", np.array(free)))
-    return tuple(_region(name, state, seen_at(T_bc, polygon)) for name, state, polygon in polygons)
+    return tuple(_region(name, state, _inside(view, view.seen_at(polygon))) for name, state, polygon in polygons)
 
 
 def _box_parts(box: Box, floor_m: Array, *, is_shut: bool) -> list[Array]:
@@ -58,6 +58,11 @@ def _box_parts(box: Box, floor_m: Array, *, is_shut: bool) -> list[Array]:
         floor_m + np.array([[x * lx, y * ly, up] for x, y in ((a, b), (c, b), (c, d), (a, d))])
         for (a, b), (c, d) in spans
     ]
+
+
+def _inside(view: View, pixels: Array) -> Array:
+    """Return pixels, those beyond the picture's edge drawn back to it.  (n, 2) -> (n, 2)"""
+    return np.clip(pixels, 0.0, (view.lens.width_px - 1, view.lens.height_px - 1))
 
 
 def _region(name: str, state: str, pixels: Array) -> NamedRegion:

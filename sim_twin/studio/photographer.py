@@ -1,6 +1,7 @@
 """The twin as a photographer: boards to calibrate by, a guided sample, and pictures whose truth is known."""
 
 from collections.abc import Iterator, Sequence
+from types import MappingProxyType
 
 import numpy as np
 
@@ -16,24 +17,26 @@ from sim_twin.studio.boards import photograph_boards
 from sim_twin.studio.conditions import Conditions, Lighting, drawn_conditions
 from sim_twin.studio.naming import named_regions
 from sim_twin.studio.staging import stage, stage_sample
-from sim_twin.studio.viewing import EYE_M, LENS, TARGET_M, looking, nudged
+from sim_twin.studio.viewing import RIG_VIEW, STUDIO_VIEW, View, nudged
 
 __all__ = ["SAMPLE_SEED", "TwinPhotographer", "open_studio"]
 
 SAMPLE_SEED = 900_001
-SHADOW_PX = 2048
-SPEC = CameraSpec(name="front", serial="twin", width_px=LENS.width_px, height_px=LENS.height_px, rate_hz=30.0)
+VIEWS = MappingProxyType({view.name: view for view in (STUDIO_VIEW, RIG_VIEW)})
+RATE_HZ = 30.0
 PERIOD_NS = 40_000_000
 
 
-def open_studio(resolved: Resolved, *, sharpness: float = 2.0) -> "TwinPhotographer":
-    """Return a photographer of a scenario's table.
+def open_studio(resolved: Resolved, *, sharpness: float = 2.0, camera: str = "front") -> "TwinPhotographer":
+    """Return a photographer of a scenario's table, with the camera of a name.
 
     Raises:
-        RobotConfigError: nothing here can draw; the message says what to do.
+        RobotConfigError: there is no such camera, or nothing here can draw; the message says what to do.
     """
+    if camera not in VIEWS:
+        raise RobotConfigError(f"expected a camera of the twin ({', '.join(VIEWS)}), came {camera!r}")
     try:
-        return TwinPhotographer(resolved, sharpness=sharpness)
+        return TwinPhotographer(resolved, sharpness=sharpness, view=VIEWS[camera])
     except NoGLError as error:
         raise RobotConfigError(str(error)) from error
 
@@ -41,15 +44,20 @@ def open_studio(resolved: Resolved, *, sharpness: float = 2.0) -> "TwinPhotograp
 class TwinPhotographer:
     """One twin, one camera; every picture is drawn from a seed of its own."""
 
-    def __init__(self, resolved: Resolved, *, sharpness: float) -> None:
+    def __init__(self, resolved: Resolved, *, sharpness: float, view: View) -> None:
         plant = TwinPlant(arm=resolved.arm, scenario=resolved.scenario, rig=resolved.rig)
         self._world, self._truth = plant.world, plant.truth
         self._kinematics, self._sharpness = Kinematics(resolved.arm), sharpness
         model = self._world.model
-        model.vis.quality.shadowsize = min(model.vis.quality.shadowsize, SHADOW_PX)
-        self._lighting, self._T_bc = Lighting(model), looking(EYE_M, TARGET_M)
+        model.vis.quality.shadowsize = min(model.vis.quality.shadowsize, view.shadow_px)
+        model.vis.quality.offsamples = view.offsamples
+        self._lighting, self._view, self._T_bc = Lighting(model), view, view.T_bc
+        lens = view.lens
+        self._spec = CameraSpec(
+            name=view.name, serial="twin", width_px=lens.width_px, height_px=lens.height_px, rate_hz=RATE_HZ
+        )
         self._camera = RenderedCamera(
-            model=model, data=self._world.data, spec=SPEC, lens=LENS, T_bc=self._T_bc,
+            model=model, data=self._world.data, spec=self._spec, lens=lens, T_bc=self._T_bc,
             optics=Optics(sharpness=sharpness), rng=np.random.default_rng(0),
         )  # fmt: skip
         self._camera.connect()
@@ -61,7 +69,7 @@ class TwinPhotographer:
 
     def boards(self, board: PrintedBoard) -> Iterator[BoardPhotograph]:
         """Give pictures of a printed board: for the lens, then lying on the table and touched."""
-        return photograph_boards(board, SPEC, self._T_bc)
+        return photograph_boards(board, self._spec, self._view)
 
     def sample(self) -> Sequence[tuple[Photograph, tuple[NamedRegion, ...]]]:
         """Give two pictures, lamps off and on, and what a person names in them."""
@@ -70,7 +78,7 @@ class TwinPhotographer:
             rng = np.random.default_rng([SAMPLE_SEED, int(is_lit)])
             stage_sample(self._world, self._kinematics, SAMPLE_SEED, is_lit=is_lit)
             photograph = self._taken("clean", rng)
-            regions = named_regions(self._world.scenario, photograph.objects, self._T_bc, is_lit=is_lit)
+            regions = named_regions(self._world.scenario, photograph.objects, self._view, is_lit=is_lit)
             taken.append((photograph, regions))
         return taken
 

@@ -1,19 +1,58 @@
-"""Where the studio's camera stands and what its lens is like. Data and maths."""
+"""Where the twin's cameras stand and what their lenses are like. Data and maths."""
 
+import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
 from sim_twin.lens import TrueLens, bent_pixels
 
-__all__ = ["EYE_M", "LENS", "TARGET_M", "looking", "nudged", "seen_at"]
+__all__ = ["RIG_VIEW", "STUDIO_VIEW", "View", "looking", "nudged"]
 
 Array = NDArray[np.float64]
 EYE_M, TARGET_M = (0.98, 0.04, 1.16), (0.435, 0.0, 0.0)
 """Before the table, opposite the arm, 65 degrees above it: over the leaves of open lids one sees into the boxes."""
-LENS = TrueLens(
-    width_px=1280, height_px=720, focal_px=(918.0, 921.0), centre_px=(652.3, 351.8),
-    radial=(-0.11, 0.06), tangential=(0.0011, -0.0007),
+
+
+class View(msgspec.Struct, frozen=True, kw_only=True):
+    """One camera: its lens, its place, and how finely it is drawn."""
+
+    name: str
+    lens: TrueLens
+    eye_m: tuple[float, float, float] = EYE_M
+    target_m: tuple[float, float, float] = TARGET_M
+    shadow_px: int = 2048
+    offsamples: int = 4
+    """Samples a drawn pixel, against jagged edges."""
+
+    @property
+    def T_bc(self) -> Array:
+        """Where the camera is.  -> (4, 4)"""
+        return looking(self.eye_m, self.target_m)
+
+    def seen_at(self, points_m: Array) -> Array:
+        """Return the pixels of points of the base frame that are before the camera.  (n, 3) m -> (n, 2) px"""
+        T = self.T_bc
+        local = (points_m - T[:3, 3]) @ T[:3, :3]
+        return bent_pixels(self.lens, local[:, :2] / local[:, 2:])
+
+
+STUDIO_VIEW = View(
+    name="front",
+    lens=TrueLens(
+        width_px=1280, height_px=720, focal_px=(918.0, 921.0), centre_px=(652.3, 351.8),
+        radial=(-0.11, 0.06), tangential=(0.0011, -0.0007),
+    ),
 )  # fmt: skip
+"""What single pictures are taken with: wide, 720 rows."""
+RIG_VIEW = View(
+    name="table",
+    lens=TrueLens(
+        width_px=640, height_px=480, focal_px=(776.0, 778.5), centre_px=(326.4, 236.1),
+        radial=(-0.09, 0.05), tangential=(0.0008, -0.0011),
+    ),
+    shadow_px=1024, offsamples=0,
+)  # fmt: skip
+"""What a rig looks through, twenty times a second: 45 degrees wide, so that the table fills the picture."""
 
 
 def looking(eye_m: tuple[float, float, float], target_m: tuple[float, float, float]) -> Array:
@@ -35,9 +74,3 @@ def nudged(T_bc: Array, turn_rad: Array, shift_m: Array) -> Array:
     T = T_bc.copy()
     T[:3, :3], T[:3, 3] = T_bc[:3, :3] @ (left @ right), T_bc[:3, 3] + shift_m
     return T
-
-
-def seen_at(T_bc: Array, points_m: Array) -> Array:
-    """Return the pixels of points of the base frame that are before the camera.  (n, 3) m -> (n, 2) px"""
-    local = (points_m - T_bc[:3, 3]) @ T_bc[:3, :3]
-    return bent_pixels(LENS, local[:, :2] / local[:, 2:])

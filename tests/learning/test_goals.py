@@ -178,3 +178,33 @@ def test_what_is_not_valid_is_not_judged(judge):
     at_blue = percept(tool=(0.54, 0.25, 0.03), grip=FULL)
     assert judge.achieved(at_blue)[BLUE_GRABBED]
     assert not judge.achieved(unseen(at_blue, "blue_cylinder"))[BLUE_GRABBED]
+
+
+def aged(percept, i, age_s):
+    """The same with an entry of P(t) so old."""
+    return msgspec.structs.replace(percept, ages_s=tuple(age_s if k == i else a for k, a in enumerate(percept.ages_s)))
+
+
+def test_what_ground_truth_shows_is_known_of_all_goals_by_what_is_seen_now(judge):
+    now = percept(tool=(0.54, 0.25, 0.03), grip=FULL)
+    assert judge.known(now, since_ns=now.stamp_ns) == (True,) * 6
+
+
+def test_a_lamp_that_is_hidden_or_was_seen_too_long_ago_leaves_its_goal_unknown(judge):
+    now = msgspec.structs.replace(percept(lit=(1, 0, 0)), stamp_ns=1_000_000_000)
+    lamp = len(now.distances_m)
+    hidden = msgspec.structs.replace(now, valid=tuple(k != lamp for k in range(len(now.valid))))
+    assert judge.known(hidden) == (False, True, True, True, True, True)
+    old = aged(now, lamp, 0.1)
+    assert judge.known(old)[ORANGE]
+    assert judge.known(old, since_ns=900_000_000)[ORANGE]
+    assert not judge.known(old, since_ns=900_000_001)[ORANGE]
+
+
+def test_an_empty_hand_is_known_to_hold_nothing_and_a_full_one_holds_what_is_seen(judge):
+    empty = unseen(percept(tool=(0.54, 0.25, 0.03), grip=OPEN), "blue_cylinder")
+    assert judge.known(empty)[BLUE_GRABBED]
+    full = unseen(percept(tool=(0.54, 0.25, 0.03), grip=FULL), "blue_cylinder")
+    assert not judge.known(full)[BLUE_GRABBED]
+    assert not judge.known(full)[IN_BOX]
+    assert judge.known(full)[RED_GRABBED]

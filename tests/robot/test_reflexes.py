@@ -86,6 +86,12 @@ def test_the_hand_shuts_exactly_while_an_objects_centre_lies_between_the_pads(ha
     assert hand.show(tcp) is shuts
 
 
+def test_the_hand_does_not_shut_on_what_is_not_perceived_now(hand):
+    seen = percept(hand.places, tcp_m=at(), stamp_ns=STEP_NS)
+    hidden = tuple(msgspec.structs.replace(o, is_valid=o.name != "red_cylinder") for o in seen.objects)
+    assert hand.reflexes.decide(msgspec.structs.replace(seen, objects=hidden), None).opening_m == STROKE
+
+
 def test_the_arm_waits_while_a_reflex_moves_the_fingers(hand):
     hand.show(at(dx=0.004))
     assert hand.reflexes.wait_at_m == at(dx=0.004)

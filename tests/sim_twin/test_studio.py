@@ -17,7 +17,7 @@ from sim_twin.plant import TwinPlant
 from sim_twin.studio.conditions import LEVELS, Lighting, drawn_conditions
 from sim_twin.studio.naming import named_regions
 from sim_twin.studio.staging import stage, stage_sample
-from sim_twin.studio.viewing import EYE_M, LENS, TARGET_M, looking, nudged, seen_at
+from sim_twin.studio.viewing import RIG_VIEW, STUDIO_VIEW, nudged
 
 
 @pytest.fixture(scope="module")
@@ -26,19 +26,25 @@ def plant():
     return TwinPlant(arm=resolved.arm, scenario=resolved.scenario, rig=resolved.rig)
 
 
-def test_forward_and_backward_the_lens_is_one():
-    sample = directions(LENS)[::90, ::90]
-    u, v = np.meshgrid(np.arange(0, 1280, 90), np.arange(0, 720, 90))
-    back = bent_pixels(LENS, sample.reshape(-1, 2))
+VIEWS = pytest.mark.parametrize("view", [STUDIO_VIEW, RIG_VIEW], ids=lambda view: view.name)
+
+
+@VIEWS
+def test_forward_and_backward_the_lens_is_one(view):
+    lens = view.lens
+    sample = directions(lens)[::90, ::90]
+    u, v = np.meshgrid(np.arange(0, lens.width_px, 90), np.arange(0, lens.height_px, 90))
+    back = bent_pixels(lens, sample.reshape(-1, 2))
     assert back == pytest.approx(np.column_stack([u.ravel(), v.ravel()]), abs=1e-4)
 
 
-def test_what_the_camera_looks_at_is_in_the_middle_and_a_nudge_turns_it_by_as_much():
-    T = looking(EYE_M, TARGET_M)
-    assert np.hypot(*(seen_at(T, np.array([TARGET_M]))[0] - LENS.centre_px)) < 1e-9
+@VIEWS
+def test_what_the_camera_looks_at_is_in_the_middle_and_a_nudge_turns_it_by_as_much(view):
+    T = view.T_bc
+    assert np.hypot(*(view.seen_at(np.array([view.target_m]))[0] - view.lens.centre_px)) < 1e-9
     moved = nudged(T, np.array([0.0, 0.001, 0.0]), np.zeros(3))
     assert moved[:3, :3] @ moved[:3, :3].T == pytest.approx(np.eye(3))
-    assert abs(seen_at(moved, np.array([TARGET_M]))[0][0] - LENS.centre_px[0]) == pytest.approx(0.918, rel=0.01)
+    assert np.arccos(moved[:3, 2] @ T[:3, 2]) == pytest.approx(0.001, rel=1e-3)
 
 
 def test_a_seed_is_one_table_and_cylinders_that_were_put_free_touch_nothing(plant):
@@ -86,17 +92,18 @@ def test_light_is_changed_from_what_was_built_and_not_from_what_was_drawn_before
     assert (model.light_diffuse == built).all()
 
 
-def test_the_sample_shows_lamps_off_over_open_boxes_and_lamps_on_over_shut_ones(plant):
-    world, T = plant.world, looking(EYE_M, TARGET_M)
+@VIEWS
+def test_the_sample_shows_lamps_off_over_open_boxes_and_lamps_on_over_shut_ones(plant, view):
+    world, lens = plant.world, view.lens
     for is_lit in (False, True):
         stage_sample(world, Kinematics(resolve().arm), 5, is_lit=is_lit)
-        regions = named_regions(world.scenario, plant.truth.read().objects, T, is_lit=is_lit)
+        regions = named_regions(world.scenario, plant.truth.read().objects, view, is_lit=is_lit)
         named = {(r.name, r.state) for r in regions}
         assert ("green_button", "on" if is_lit else "off") in named
         assert (("red_cylinder", "") in named) is not is_lit
         leaf = world.data.joint(on_table("red_box", "leaf_near")).qpos[0]
         assert bool(leaf < 0.01) is is_lit
-        inside = [all(0 <= u < 1280 and 0 <= v < 720 for u, v in r.polygon_px) for r in regions]
+        inside = [all(0 <= u < lens.width_px and 0 <= v < lens.height_px for u, v in r.polygon_px) for r in regions]
         assert all(inside)
 
 

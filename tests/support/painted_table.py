@@ -14,6 +14,7 @@ from tests.support.boards import LENS, known_camera, matrices
 
 SCENARIO = resolve().scenario
 GLOW = 0.55
+FINER = 3
 BASE_RGB = (0.1, 0.1, 0.11)
 FACES = ((0, 1, 3, 2), (4, 5, 7, 6), (0, 1, 5, 4), (2, 3, 7, 6), (0, 2, 6, 4), (1, 3, 7, 5))
 
@@ -36,6 +37,11 @@ def placed_camera(eye=(0.98, 0.04, 1.16), target=(0.435, 0.0, 0.0)):
     ), T  # fmt: skip
 
 
+def finer(pixels):
+    """Pixels on the canvas, which is finer: OpenCV fills every pixel that an edge touches."""
+    return FINER * pixels + (FINER - 1) / 2
+
+
 CAMERA, T_BC = placed_camera()
 
 
@@ -51,19 +57,19 @@ class Painting:
     """One table: what is where, and its picture."""
 
     def __init__(self, *, light=(1.0, 1.0, 1.0), noise=1.0, seed=0):
-        self._canvas = np.full((LENS.height_px, LENS.width_px, 3), 90.0)
+        self._canvas = np.full((FINER * LENS.height_px, FINER * LENS.width_px, 3), 90.0)
         self._light, self._noise, self._rng = np.array(light), noise, np.random.default_rng(seed)
         table = SCENARIO.table
         (x, y), (a, b) = table.centre_m, np.array(table.size_m) / 2
         self.polygon([[x - a, y - b, 0], [x + a, y - b, 0], [x + a, y + b, 0], [x - a, y + b, 0]], table.colour)
 
     def polygon(self, points, rgb, shade=1.0):
-        corners_px = np.round(seen_at(points) * 16).astype(np.int32)
+        corners_px = np.round(finer(seen_at(points)) * 16).astype(np.int32)
         colour = 230.0 * np.array(rgb) * shade
         cv2.fillPoly(self._canvas, [corners_px], colour.tolist(), lineType=8, shift=4)
 
     def hull(self, points, rgb, shade=1.0):
-        outline = cv2.convexHull(seen_at(points).astype(np.float32)).reshape(-1, 2)
+        outline = cv2.convexHull(finer(seen_at(points)).astype(np.float32)).reshape(-1, 2)
         cv2.fillConvexPoly(
             self._canvas, np.round(outline * 16).astype(np.int32), (230.0 * np.array(rgb) * shade).tolist(), 8, 4
         )
@@ -110,7 +116,8 @@ class Painting:
         self.hull(lying_points(cylinder, axis_rad) + at, cylinder.colour, 0.85)
 
     def frame(self):
-        fine = cv2.GaussianBlur(self._canvas, (0, 0), 0.6) * self._light
+        drawn = cv2.resize(self._canvas, (LENS.width_px, LENS.height_px), interpolation=cv2.INTER_AREA)
+        fine = cv2.GaussianBlur(drawn, (0, 0), 0.6) * self._light
         noisy = fine + self._rng.normal(0.0, self._noise, fine.shape)
         picture = np.clip(np.round(noisy), 0, 255).astype(np.uint8)
         return frame_of(picture, camera="side", sequence=0, stamp_ns=7, arrival_ns=9)

@@ -139,6 +139,13 @@ class ToyJudge:
     def achieved(self, percept: Percept) -> GoalState:
         return tuple(lamp > 0.5 for lamp in percept.button_states)
 
+    def known(self, percept: Percept, *, since_ns: int | None = None) -> GoalState:
+        entries = list(zip(percept.valid, percept.ages_s, strict=True))[N_GOALS:]
+        return tuple(
+            is_valid and (since_ns is None or percept.stamp_ns - round(age_s * 1e9) >= since_ns)
+            for is_valid, age_s in entries
+        )
+
     def is_hand_free(self, goal: int, percept: Percept) -> bool:
         return True
 
@@ -254,6 +261,9 @@ class ToyExperts:
         return Heading(heading_rad=math.atan2(to_y - y, to_x - x), distance_m=distance, height_m=0.05)
 
     def observe(self, result: StepResult, achieved: GoalState) -> None:
+        pass
+
+    def notice(self, percept: Percept, achieved: GoalState) -> None:
         pass
 
     def end_trial(self, outcome: TrialOutcome, *, is_fair: bool = True) -> None:

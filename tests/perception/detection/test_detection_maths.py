@@ -99,11 +99,12 @@ def test_where_nothing_of_a_body_is_left_there_is_no_fit():
 
 
 def test_the_best_place_is_the_one_whose_edges_lie_on_the_slopes():
-    right, down = np.zeros((60, 60)), np.zeros((60, 60))
-    right[:, 33] = 0.5
+    grey = np.zeros((60, 60), np.float32)
+    grey[:, 33], grey[:, 34:] = 0.5, 1.0
     edges = np.array([[30.0, v, 1.0, 0.0, 1000.0, 0.0, 0.0, 1000.0] for v in range(20, 40)])
-    i, _, peak, before, after, _, _ = best_place(right, down, edges, 0.001, 6)
-    assert (i, before, after) == (3.0, 0.0, 0.0)
+    i, _, peak, before, after, _, _ = best_place(grey, edges, 0.001, 6)
+    assert i == 3.0
+    assert before == after == pytest.approx(0.25 / 0.28)
     assert peak == pytest.approx(0.5 / 0.53)
 
 
