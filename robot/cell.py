@@ -78,6 +78,10 @@ class Cell:
         self._begin(epoch)
         return self._digital_out
 
+    def outputs_at(self, epoch: int) -> int:
+        """Return the outputs that an epoch starts from. Nothing changes."""
+        return self._want(self._rules_at(epoch), 0)
+
     def tick(self, state: ArmState) -> int:
         """Take in the inputs of one tick and return the outputs to write.
 
@@ -89,7 +93,7 @@ class Cell:
             latched |= GRIPPER_BIT
         if latched != self._latched:
             self._latched = latched
-            self._wanted = self._want()
+            self._wanted = self._want(self._rules, self._latched)
         if self._wanted != self._digital_out:
             self._digital_out = self._allow(state.tcp_position_m)
         return self._digital_out
@@ -102,25 +106,27 @@ class Cell:
         """Restore what `state_dict` returned."""
         self._begin(int(state["epoch"]))
         self._latched = int(state["latched"])
-        self._wanted = self._want()
+        self._wanted = self._want(self._rules, self._latched)
         self._digital_out = int(state["digital_out"])
 
     def _begin(self, epoch: int) -> None:
+        self._epoch, self._rules = epoch, self._rules_at(epoch)
+        self._latched = 0
+        self._wanted = self._digital_out = self._want(self._rules, 0)
+
+    def _rules_at(self, epoch: int) -> tuple[_Condition, ...]:
         in_force = [conditions for from_epoch, conditions in self._spans if from_epoch <= epoch]
         if not in_force:
             raise RobotConfigError(f"no rules in force at epoch {epoch}: the schedule begins at {self._spans[0][0]}")
-        self._epoch = epoch
-        self._rules = in_force[-1]
-        self._latched = 0
-        self._wanted = self._digital_out = self._want()
+        return in_force[-1]
 
-    def _want(self) -> int:
+    def _want(self, rules: tuple[_Condition, ...], latched: int) -> int:
         bits = 0
         for input_bit, lamp_bit in self._lamps.items():
-            if self._latched & input_bit:
+            if latched & input_bit:
                 bits |= lamp_bit
-        for condition in self._rules:
-            if condition.holds(self._latched):
+        for condition in rules:
+            if condition.holds(latched):
                 bits |= condition.output_bit
         return bits
 

@@ -197,9 +197,13 @@ class TickLoop:
         self._arm.close()
 
     def begin_epoch(self, epoch: int) -> int:
-        """Take up the rules of an epoch, latched inputs cleared, and return the outputs it begins with."""
+        """Return the outputs that an epoch begins with. Its rules are in force from the seed that follows.
+
+        Until then ticks go on that hold the arm where it stands, in a lid's way perhaps: no output changes
+        before the reset.
+        """
         self._epoch = epoch
-        return self._cell.begin_epoch(epoch)
+        return self._cell.outputs_at(epoch)
 
     def seed(self) -> ArmState:
         """Start everything from the measured state, and return it.

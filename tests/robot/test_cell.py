@@ -54,6 +54,14 @@ def test_after_the_switch_they_shut_and_orange_opens_the_square_box(epoch):
     assert lids(tick(cell, "orange_button")) == {"square_box"}
 
 
+def test_what_an_epoch_begins_with_is_told_before_its_rules_are_in_force():
+    cell = make()
+    began = cell.begin_epoch(0)
+    assert lids(cell.outputs_at(SWITCH)) == {"red_box", "blue_box"}
+    assert cell.digital_out == began == tick(cell)
+    assert cell.begin_epoch(SWITCH) == cell.outputs_at(SWITCH)
+
+
 def test_inputs_latch_for_the_epoch_and_lamps_show_them():
     cell = make()
     cell.begin_epoch(0)

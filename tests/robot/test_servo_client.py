@@ -107,6 +107,18 @@ def test_a_process_that_takes_over_has_the_rules_of_the_epoch(client):
     assert stride(client, go()).after.digital_out == changed
 
 
+def test_no_output_changes_between_an_epochs_beginning_and_the_seed_that_follows(client):
+    """The arm stands where the last epoch ended, in a lid's way perhaps, and ticks go on that hold it there."""
+    before = client.begin_epoch(0)
+    client.engage()
+    client.seed()
+    assert stride(client, go()).after.digital_out == before
+    assert (changed := client.begin_epoch(1000)) != before
+    assert stride(client, go()).after.digital_out == before
+    client.seed()
+    assert stride(client, go()).after.digital_out == changed
+
+
 def test_what_holds_no_arm_any_more_is_stopped_without_complaint(client):
     client.engage()
     client.seed()
