@@ -36,7 +36,7 @@ BOW_M = 0.002
 ASKED_M = 0.0012
 """Set-points of a tool that goes straight bow by a millimetre between its targets; distances are told to 0.1 mm and
 joints to what they are asked with."""
-END_STOP_M = 0.002
+END_STOP_M = 0.0005
 N_LENGTHENED = 3
 DROOP_M_PER_KG = 0.0025
 """Gravity on 0.85 m of arm over the stiffness of shoulder and elbow (6 kNm/rad) and wrist (1.2 kNm/rad)."""
