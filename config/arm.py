@@ -85,6 +85,9 @@ class MotionLimits(Section, frozen=True, kw_only=True):
     jerk_m_s3: Annotated[float, Meta(gt=0.0, le=2000.0)] = 100.0
     contact_force_n: Positive = 15.0
     """Force on the tool at which a descent is stopped and reported as contact."""
+    hard_force_n: Positive = 90.0
+    """Force on the tool from which commands give way at once, as hard as they must; up to it they do so by the joints'
+    own accelerations."""
     heights_m: tuple[Span, Span] = (0.025, 0.225)
     """Lowest and travel height of the tool centre point over the table."""
     workspace_m: tuple[Point, Point]

@@ -123,6 +123,12 @@ def _check_motion(arm: ArmConfig, checker: Checker) -> None:
         f"{motion.contact_force_n:g}",
     )
     checker.need(
+        motion.contact_force_n <= motion.hard_force_n < motion.force_limit_n,
+        "motion.hard_force_n",
+        f"at least contact_force_n = {motion.contact_force_n:g} and less than force_limit_n = {motion.force_limit_n:g}",
+        f"{motion.hard_force_n:g}",
+    )
+    checker.need(
         motion.force_limit_n <= motion.impact_limit_n,
         "motion.impact_limit_n",
         f"at least force_limit_n = {motion.force_limit_n:g}",

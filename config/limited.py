@@ -12,6 +12,8 @@ FENCE_MARGIN_M = 1e-3
 """Motion keeps this far inside of a fence, so that the gate never meets one by rounding."""
 SPEED_SHARE = 0.98
 """Share of a profile's greatest speeds of the tool that motion uses."""
+HARD_SHARE = 0.4
+"""Of the lasting force, so much is the most that a push may be to be given way to no faster than joints may brake."""
 
 
 def limited(arm: ArmConfig, profile: Profile) -> ArmConfig:
@@ -53,6 +55,7 @@ def _motion(motion: MotionLimits, profile: Profile) -> MotionLimits:
         workspace_m=_fenced(motion.workspace_m, profile),
         # Fingers may touch things, not the table. Motion itself stays a margin higher than this.
         table_clearance_m=max(motion.table_clearance_m, profile.clearances.scene_m - FENCE_MARGIN_M),
+        hard_force_n=max(motion.contact_force_n, min(motion.hard_force_n, HARD_SHARE * force.steady_n)),
         force_limit_n=min(motion.force_limit_n, force.steady_n),
         impact_limit_n=min(motion.impact_limit_n, force.blow_n),
     )

@@ -16,6 +16,8 @@ from robot.appearance import dress_arm, dress_tool
 
 __all__ = [
     "ARM_CONTACT",
+    "BUMPER_SOLIMP",
+    "BUMPER_SOLREF",
     "FIXTURE_CONTACT",
     "GRIP_SOLIMP",
     "GRIP_SOLREF",
@@ -39,6 +41,7 @@ FIXTURE_CONTACT = (0, 3)
 GRIP_SOLREF = (0.004, 1.0)
 GRIP_SOLIMP = (0.99, 0.999, 0.001, 0.5, 2.0)
 BUMPER_SOLREF = (0.035, 1.0)
+BUMPER_SOLIMP = (0.2, 0.95, 0.01, 0.5, 2.0)
 
 
 def dh_constant(joint: Joint) -> Array:
@@ -191,6 +194,7 @@ def _add_finger(palm: mujoco.MjsBody, arm: ArmConfig, name: str, side: float, ma
     body.add_joint(
         name=f"finger_{name}", type=mujoco.mjtJoint.mjJNT_SLIDE, axis=[0, side, 0], range=[0, tool.stroke_m / 2],
         limited=mujoco.mjtLimited.mjLIMITED_TRUE, damping=5.0, armature=0.2,
+        solref_limit=GRIP_SOLREF, solimp_limit=GRIP_SOLIMP,
     )  # fmt: skip
     box = mujoco.mjtGeom.mjGEOM_BOX
     contype, conaffinity = ARM_CONTACT
@@ -205,7 +209,7 @@ def _add_finger(palm: mujoco.MjsBody, arm: ArmConfig, name: str, side: float, ma
     )  # fmt: skip
     body.add_geom(
         name=f"bumper_{name}", type=box, size=[wide / 2, inset / 2, bumper / 2], pos=[0, y_inset, tip_z - bumper / 2],
-        condim=3, friction=[0.6, 0.01, 0.0001], solref=BUMPER_SOLREF, solimp=[0.2, 0.95, 0.01, 0.5, 2], priority=1,
+        condim=3, friction=[0.6, 0.01, 0.0001], solref=BUMPER_SOLREF, solimp=BUMPER_SOLIMP, priority=1,
         rgba=[0.30, 0.31, 0.33, 1], group=2, **common,
     )  # fmt: skip
     top, bottom = tool.tcp_m[2] - tool.finger_depth_m, tip_z - bumper - tall

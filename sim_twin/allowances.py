@@ -12,7 +12,7 @@ stack happened to do:
   counts as broken; a real arm's servo is stiffer and overshoots less;
 * links and tool longer by e each: a point of the arm is off by at most three times e;
 * a payload that nobody compensates: joints droop by its torque over their stiffness;
-* fingers meet soft end stops;
+* fingers meet end stops that a blow of 700 N, rising in 20 ms, presses 0.7 mm deep in one step of the physics;
 * postures that set-points ask for bow by a millimetre between two targets of a tool that goes straight.
 """
 
@@ -36,7 +36,7 @@ BOW_M = 0.002
 ASKED_M = 0.0012
 """Set-points of a tool that goes straight bow by a millimetre between its targets; distances are told to 0.1 mm and
 joints to what they are asked with."""
-END_STOP_M = 0.002
+END_STOP_M = 0.001
 N_LENGTHENED = 3
 DROOP_M_PER_KG = 0.0025
 """Gravity on 0.85 m of arm over the stiffness of shoulder and elbow (6 kNm/rad) and wrist (1.2 kNm/rad)."""

@@ -10,7 +10,15 @@ import numpy as np
 from config.arm import ArmConfig
 from config.scenario import Box, Button, Cylinder, Scenario
 from config.values import Point
-from robot.description import FIXTURE_CONTACT, GRIP_SOLIMP, GRIP_SOLREF, OBJECT_CONTACT, arm_spec
+from robot.description import (
+    BUMPER_SOLIMP,
+    BUMPER_SOLREF,
+    FIXTURE_CONTACT,
+    GRIP_SOLIMP,
+    GRIP_SOLREF,
+    OBJECT_CONTACT,
+    arm_spec,
+)
 from robot.servo import lag_s
 from sim_twin.names import on_table
 
@@ -25,6 +33,11 @@ _CYLINDER = mujoco.mjtGeom.mjGEOM_CYLINDER
 _FIXTURE = {"contype": FIXTURE_CONTACT[0], "conaffinity": FIXTURE_CONTACT[1]}
 # Boxes and lids wear padding that gives way under a finger: a hand that strikes a lid's edge is not broken.
 _PADDED = {**_FIXTURE, "friction": [0.6, 0.01, 0.0001], "solref": [0.03, 1.0], "priority": 1}
+# A finger that came down beside a button bent its rubber foot out of the way, and the bare pad above it caught the rim
+# with 700 N: buttons are as soft to a pad as they are to the foot.
+_RIMMED = {
+    **_FIXTURE, "friction": [0.6, 0.01, 0.0001], "solref": BUMPER_SOLREF, "solimp": BUMPER_SOLIMP, "priority": 1
+}  # fmt: skip
 _LOOK = {"contype": 0, "conaffinity": 0, "mass": 0, "group": 1}
 
 
@@ -115,7 +128,7 @@ def _add_button(spec: mujoco.MjSpec, button: Button, table_m: float) -> None:
     ring = button.height_m - button.travel_m - 2 * cap_half
     base.add_geom(
         type=_CYLINDER, size=[radius + 0.006, ring / 2, 0], pos=[0, 0, ring / 2], rgba=[0.16, 0.17, 0.18, 1],
-        friction=[0.6, 0.01, 0.0001], **_FIXTURE,
+        **_RIMMED,
     )  # fmt: skip
     cap = base.add_body(name=on_table(button.name, "cap"), pos=[0, 0, button.height_m - cap_half])
     cap.add_joint(
@@ -125,7 +138,7 @@ def _add_button(spec: mujoco.MjSpec, button: Button, table_m: float) -> None:
     )  # fmt: skip
     cap.add_geom(
         name=on_table(button.name, "cap"), type=_CYLINDER, size=[radius, cap_half, 0], mass=0.05,
-        friction=[0.6, 0.01, 0.0001], rgba=[*button.colour, 1], **_FIXTURE,
+        rgba=[*button.colour, 1], **_RIMMED,
     )  # fmt: skip
     cap.add_geom(
         name=on_table(button.name, "dome"), type=mujoco.mjtGeom.mjGEOM_ELLIPSOID,

@@ -76,10 +76,11 @@ class ContactGuard:
             commanded_m: Where it was told to be by now.
             target_m: Where it would go.
         """
-        if self._held is not None and measured_m[2] < self._held[2] - SUNK_M:
-            self._held = None
         fx, fy, fz = force_n
         x, y, z = target_m
+        held = self._held
+        if held is not None and measured_m[2] < held[2] - SUNK_M:  # it brakes on what pushes it, or sank from there
+            self._held = (held[0], held[1], measured_m[2]) if fz > self._force_n else None
         is_pushed_up = fz > self._force_n and min(z, commanded_m[2]) < measured_m[2] - _TINY
         if is_pushed_up:
             z = max(z, measured_m[2])  # a tool that was told to rise is not held down by what it still presses on

@@ -1,7 +1,6 @@
 """The set-point that follows a target: straight lines of the tool pointing down, or joints, jerk-limited either way."""
 
 import math
-from itertools import pairwise
 from operator import le
 
 from config.arm import ArmConfig
@@ -10,6 +9,7 @@ from robot.envelope import Envelope
 from robot.geometry import turn_about_vertical, unwound
 from robot.kinematics import Kinematics, UnreachableError
 from robot.messages import Vec3, Vec6
+from robot.motion.chords import share_of_speed
 from robot.motion.free import free_bounds, is_free_step
 from robot.motion.holding import (
     TIP,
@@ -40,10 +40,6 @@ the mover finds it piece by piece: the tick in which an intent begins has enough
 STILL_RAD_S = 1e-3
 ALIGN_STEP_RAD = 0.35
 """Greatest change of any joint's target in one step while the tool is brought upright."""
-N_SPANS = 4
-"""So many chords of the way to a joint target tell how fast the parts would go along it."""
-PATH_SHARE, LEAST_SHARE = 0.96, 0.01
-"""Of the parts' greatest speeds: chords are a little shorter than the way, and joints swing in from others."""
 TURN_RAD_S, TURN_RAD_S2, TURN_RAD_S3 = 2.0, 10.0, 200.0
 """Bounds of the tool's turn about the vertical."""
 
@@ -97,7 +93,7 @@ class Follower:
             ),
             tick_s=tick_s,
         )
-        self._joint_step_rad = tuple(SPEED_SHARE * j.speed_rad_s * tick_s for j in joints)
+        self._joint_step_rad = _vec6([SPEED_SHARE * j.speed_rad_s * tick_s for j in joints])
         self._bounds = free_bounds(envelope, self._kinematics.chain, tip_min_m=tip_min_m)
         self.seed(arm.home_rad)
 
@@ -157,23 +153,10 @@ class Follower:
         """Go to joint angles."""
         if self._is_upright:
             self._take_up_joints()
-        self._joints.slow_to(self._share_of_speed(q_rad))
+        chain, most = self._kinematics.chain, self._joint_step_rad
+        self._joints.slow_to(share_of_speed(self.q_rad, q_rad, chain, most, self._envelope.part_step_m))
         self._joints.aim(list(q_rad))
         self.target_m = self._kinematics.tcp(q_rad)
-
-    def _share_of_speed(self, q_rad: Vec6) -> float:
-        """Return the share of their greatest speeds at which joints may go straight to others, by the parts' speeds."""
-        now, chain = self.q_rad, self._kinematics.chain
-        turns = max([abs(b - a) / most for a, b, most in zip(now, q_rad, self._joint_step_rad, strict=True)])
-        if turns <= 0.0:
-            return 1.0
-        places = [chain.points(_between(now, q_rad, k / N_SPANS))[0] for k in range(N_SPANS + 1)]
-        fastest = max(
-            math.dist(a, b) / most
-            for before, after in pairwise(places)
-            for a, b, most in zip(before, after, self._envelope.part_step_m, strict=True)
-        )
-        return min(1.0, max(LEAST_SHARE, PATH_SHARE * turns / (N_SPANS * fastest))) if fastest > 0.0 else 1.0
 
     def joints_at(self, place_m: Vec3, yaw_rad: float | None = None, seed_rad: Vec6 | None = None) -> Vec6 | None:
         """Return joints near the present ones that bring the tool to a place; None where none do, or it is tilted.
@@ -206,6 +189,15 @@ class Follower:
             self.target_m = (x, y, z)
         else:
             self.target_m = self._kinematics.tcp(_vec6(self._joints.brake()))
+
+    def give_way(self, q_rad: Vec6) -> Vec6:
+        """Go towards joints in one tick as hard as the limits let, and go on from there; return what to command."""
+        self.trouble = self.held = None
+        q = self._hold_back(q_rad, is_pushed=True)
+        if self.held is None:
+            self._go_on(q, self._points[0][0])
+        self._q_earlier_rad, self.q_before_rad, self.q_rad = self.q_before_rad, self.q_rad, q
+        return q
 
     def step(self) -> Vec6:
         """Advance by one tick and return the joints to command."""
@@ -258,7 +250,7 @@ class Follower:
         self._tool.aim(target)
         return self._tool.at
 
-    def _hold_back(self, q: Vec6) -> Vec6:
+    def _hold_back(self, q: Vec6, *, is_pushed: bool = False) -> Vec6:
         """Hold a step back where joints would change their speeds too hard, or anything is too fast for what is ahead.
 
         It is brought back towards the step of an arm that brakes; motion goes on from there.
@@ -292,7 +284,7 @@ class Follower:
             self._is_fenced = self._is_fenced or name in self._fence_names
             q = _moved(now, [b + share * (w - b) for w, b in zip(wanted, base, strict=True)])
             points = chain.points(q)
-            self._go_on(q, points[0][0])
+            self._go_on(q, points[0][0], is_braking_kept=not is_pushed)
         self._points_before, self._points = self._points[0], points
         return q
 
@@ -320,19 +312,20 @@ class Follower:
     def _lowest_m(self, place: tuple[Points, float]) -> float:
         return self._kinematics.chain.lowest_m(place[0][0], place[1])
 
-    def _go_on(self, q: Vec6, tcp_m: Vec3) -> None:
+    def _go_on(self, q: Vec6, tcp_m: Vec3, *, is_braking_kept: bool = False) -> None:
         """Let the limiter in charge go on from joints that are other than it said."""
         now, before = self.q_rad, self.q_before_rad
         if not self._is_upright:
             target = self._joints.target
-            self._joints.go_on(list(before), list(now), list(q))
+            self._joints.go_on(list(before), list(now), list(q), is_braking_kept=is_braking_kept)
             self._joints.aim(target)
             return
         tool, quat = self._tool, self._kinematics.chain.quat
         target = tool.target
         yaws = [unwound(turn_about_vertical(quat(at)), target[3]) for at in (before, now, q)]
         places = (self._points_before[0], self._points[0][0], tcp_m)
-        tool.go_on(*([*place, yaw] for place, yaw in zip(places, yaws, strict=True)))
+        moves = ([*place, yaw] for place, yaw in zip(places, yaws, strict=True))
+        tool.go_on(*moves, is_braking_kept=is_braking_kept)
         tool.aim(target)
         self._is_solved = False
         self._take_up_lean(q)

@@ -27,7 +27,9 @@ __all__ = [
     "share_left",
     "share_of_giving_way",
     "share_of_way",
+    "share_of_way_back",
     "slid",
+    "speed_step",
     "stretch",
     "tips_too_fast",
     "too_fast",
@@ -177,6 +179,16 @@ def share_of_giving_way(now_rad: Vec6, last_rad: Vec6, q_rad: Vec6, measured_rad
     return share
 
 
+def share_of_way_back(now_rad: Vec6, back_rad: Vec6, envelope: Envelope) -> float:
+    """Return how much of the way to joints may be gone in a tick by an arm that is to rest there, above 0 to 1."""
+    share = 1.0
+    for now, back, end in zip(now_rad, back_rad, envelope.joints, strict=True):
+        gap = abs(back - now)
+        if gap > 0.0:
+            share = min(share, braking_step(gap, RESERVE * RESERVE * end.gain_rad, envelope.onset) / gap)
+    return share
+
+
 def _of_joints(now_rad: Vec6, steps: Sequence[float], lost: float, envelope: Envelope) -> list[Met]:
     met: list[Met] = []
     for i, (now, step, end) in enumerate(zip(now_rad, steps, envelope.joints, strict=True)):
@@ -202,11 +214,21 @@ def _of_speeds(before: Points, now: Points, to: Points, envelope: Envelope) -> l
         bound = SPEED_RESERVE * most
         if squared > NEAR_SPEED * NEAR_SPEED * bound * bound:
             size = math.sqrt(squared)
-            if envelope.overshoot > 0.0:  # what gathers speed goes on doing so while its jerk ends that
-                bound -= envelope.overshoot * max(0.0, size - math.dist(before[i], now[i]))
+            if envelope.overshoot > 0.0:
+                bound = speed_step(bound, math.dist(before[i], now[i]), envelope.overshoot)
             if size > bound:
                 met.append(Met(PART_NAMES[i], PART, i, size, bound))
     return met
+
+
+def speed_step(most_m: float, last_m: float, overshoot: float) -> float:
+    """Return how far a part may go that went so far in the tick before: what gathers speed, overshoots.
+
+    It goes on gathering speed while its jerk ends that, by a share of what it gained: s + overshoot (s - last) may be
+    `most_m` at most, for the step s itself that is taken and not for the one that was wanted. A wanted step that was
+    long enough left nothing otherwise, and an arm at rest stayed there for good.
+    """
+    return most_m if last_m >= most_m else (most_m + overshoot * last_m) / (1.0 + overshoot)
 
 
 def _of_fences(now: Points, to: Points, end: Points | None, lost: float, envelope: Envelope) -> list[Met]:

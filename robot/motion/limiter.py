@@ -52,15 +52,28 @@ class Limiter:
         self._now.target_position = self._target = at
         self._is_resting = self.is_failed = False
 
-    def go_on(self, earlier: list[float], before: list[float], at: list[float]) -> None:
+    def go_on(
+        self, earlier: list[float], before: list[float], at: list[float], *, is_braking_kept: bool = False
+    ) -> None:
         """Start on the move that three places a tick apart tell of, the newest last.  (n,), (n,), (n,)
 
         Their differences are means over ticks; the speed that there is at the end of the last is half a tick on.
+
+        Args:
+            earlier: places.
+            before: places a tick later.
+            at: where the axes are.
+            is_braking_kept: an axis that was about to brake harder than the places tell goes on doing so. In short
+                ticks one step of its jerk is less than what a limit takes off: begun anew with each tick a brake was
+                never built up, and the tool went on away from its target, at the limit, until the gate stopped it.
         """
-        dt = self._tick_s
+        dt, planned = self._tick_s, self.acceleration if is_braking_kept else None
         rate = [(c - 2.0 * b + a) / (dt * dt) for a, b, c in zip(earlier, before, at, strict=True)]
         rate = [min(max(a, -most), most) for a, most in zip(rate, self._acceleration, strict=True)]
-        self.seed(at, [(c - b) / dt + 0.5 * dt * a for b, c, a in zip(before, at, rate, strict=True)], rate)
+        speed = [(c - b) / dt + 0.5 * dt * a for b, c, a in zip(before, at, rate, strict=True)]
+        if planned is not None:
+            rate = [(min if v > 0.0 else max)(a, p) for v, a, p in zip(speed, rate, planned, strict=True)]
+        self.seed(at, speed, rate)
 
     @property
     def at(self) -> list[float]:

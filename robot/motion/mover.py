@@ -10,7 +10,7 @@ from robot.messages import ArmState, Heading, Intent, JointTarget, Limited, Twis
 from robot.motion.approach import N_PIECES, Approach
 from robot.motion.contact import ContactGuard
 from robot.motion.follower import SWIFT_TICK_S, Follower
-from robot.motion.holding import MARGIN_M, MARGIN_RAD, led_out, share_of_giving_way
+from robot.motion.holding import MARGIN_M, MARGIN_RAD, led_out, share_of_giving_way, share_of_way_back
 from robot.motion.pieces import Pieces, padded, whole
 from robot.motion.target import (
     MAX_TURN_RAD,
@@ -68,7 +68,7 @@ class Mover:
         self._limits = TargetLimits.of(arm, table_m)
         self._follower = Follower(arm, envelope=envelope, tick_s=tick_s, tip_min_m=self._limits.tip_min_m)
         self._envelope = envelope
-        self._contact = ContactGuard(arm)
+        self._contact, self._hard_n = ContactGuard(arm), arm.motion.hard_force_n
         is_swift = tick_s < SWIFT_TICK_S
         self._trail = Trail(
             arm.servo, tick_s=tick_s, q_rad=self._follower.q_rad, n_ahead=N_PIECES + 1 if is_swift else 0
@@ -167,8 +167,8 @@ class Mover:
     def tick(self, state: ArmState) -> Vec6:
         """Return the joints to command for this tick, eased by the measured force.
 
-        Where the force says stop, the command falls back to the measured joints at once: they trail it by a lag that
-        would go on pressing.
+        Where the force says stop, the command goes back to the measured joints: they trail it by a lag that would go on
+        pressing. It falls back at once if the push is hard, and by the joints' own accelerations if it is not.
         """
         follower = self._follower
         if not self._contact.is_free(state.tcp_force_n):
@@ -205,18 +205,29 @@ class Mover:
         self._amounts[name] = max(self._amounts.get(name, 0.0), amount)
 
     def _give_way(self, target_m: Vec3, state: ArmState) -> Vec6:
-        """Fall back to the measured joints and aim at a target, but never let a push carry the command past a fence."""
+        """Go back to the measured joints and aim at a target, but never let a push carry the command past a fence."""
         self._way, follower = None, self._follower
         yaw, back = follower.yaw_rad, self._back_to(state.q_rad)
         if not self._is_inside(back):
             back = self._back_inside(state)
+        aim_m = fence(target_m, state.tcp_position_m, self._limits).position_m  # nearer to where it was
+        if math.hypot(*state.tcp_force_n) <= self._hard_n:
+            share = share_of_way_back(follower.q_rad, back, self._envelope)
+            q = follower.give_way(
+                _along(follower.q_rad, [b - a for a, b in zip(follower.q_rad, back, strict=True)], share)
+            )
+            self._trail.add(q)
+            if follower.held is not None:
+                self._note(*follower.held)
+            follower.aim(aim_m, yaw)
+            return q
         change = [b - a for a, b in zip(follower.q_rad, back, strict=True)]
         share = share_of_giving_way(follower.q_rad, follower.q_before_rad, back, state.q_rad, self._envelope)
         if share < 1.0:
             back = _along(follower.q_rad, change, share)
         follower.seed(back)
         self._trail.seed(back)
-        follower.aim(fence(target_m, state.tcp_position_m, self._limits).position_m, yaw)  # nearer to where it was
+        follower.aim(aim_m, yaw)
         return back
 
     def _back_inside(self, state: ArmState) -> Vec6:

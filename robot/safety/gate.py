@@ -177,7 +177,7 @@ class Gate:
             return refusal
         self._force_before_n = force_n
         q, last_rad = command.q_rad, self._course.last_rad
-        self._is_pushed = force_n > limits.contact_n
+        self._is_pushed = force_n > limits.hard_n
         pushed_rad = state.q_rad if self._is_pushed else None
         if q != last_rad:
             refusal = (

@@ -32,6 +32,8 @@ class GateLimits(msgspec.Struct, frozen=True, kw_only=True):
     tracking_error_rad: float
     contact_n: float
     """A tool with no more than this on it is free: its commands have nothing to give way to."""
+    hard_n: float
+    """Up to this a command gives way as hard as its joints may, and no harder."""
     force_max_n: float
     """Greatest steady force on the tool."""
     impact_max_n: float
@@ -74,6 +76,7 @@ class GateLimits(msgspec.Struct, frozen=True, kw_only=True):
             tip_min_m=table_m + motion.table_clearance_m,
             tracking_error_rad=motion.tracking_error_rad,
             contact_n=motion.contact_force_n,
+            hard_n=motion.hard_force_n,
             force_max_n=motion.force_limit_n,
             impact_max_n=motion.impact_limit_n,
             opening_m=(0.0, min(tool.stroke_m, spec.grip_stroke_m)),

@@ -41,7 +41,7 @@ class Outcome(msgspec.Struct, frozen=True, kw_only=True):
 
 
 def try_mutation(
-    resolved: Resolved, mutation: Mutation, *, seed: int, n_streams: int = 12, n_commands: int = 334
+    resolved: Resolved, mutation: Mutation, *, seed: int, n_streams: int | None = None, n_commands: int = 334
 ) -> Outcome:
     """Run the same streams with the limit as it is and weakened, until one tells.
 
@@ -49,10 +49,10 @@ def try_mutation(
         resolved: rig and the profile to start from.
         mutation: which limit.
         seed: of the streams.
-        n_streams: at most so many of them.
+        n_streams: at most so many of them; the mutation's own number where absent.
         n_commands: of each.
     """
-    resolved = replace(resolved, arm=mutation.refit(resolved.arm))
+    resolved, n_streams = replace(resolved, arm=mutation.refit(resolved.arm)), n_streams or mutation.n_streams
     true = mutation.tighten(resolved.profile)
     ring = Ring(_holding(resolved, true), NOMINAL, true, n_commands=n_commands)
     try:

@@ -41,6 +41,8 @@ class Mutation(msgspec.Struct, frozen=True, kw_only=True):
     """The arm whose own file would hide it."""
     fit: Callable[[Profile, float], Profile] | None = None
     """Sets the limit to the worst that came of the plant as it is, where that alone says what binds."""
+    n_streams: int = 12
+    """At most so many are tried."""
 
 
 def _joints(profile: Profile, **by: float) -> Profile:
@@ -198,7 +200,7 @@ MUTATIONS: tuple[Mutation, ...] = (
     Mutation(
         name="steady force", limits=("contact_force.steady_n",), told_by=("steady_force",),
         tighten=lambda p: _steady(p, 60.0), weaken=lambda p: _steady(p, 60.0 * BY),
-        families=("gate_leans",),
+        families=("gate_leans",), n_streams=15,
     ),
     Mutation(
         name="greatest grip force", limits=("grip.force_n[1]",), told_by=("command_grip_force",),

@@ -128,7 +128,7 @@ def test_of_two_limits_the_smaller_is_held(tmp_path):
     assert held.joints[0].speed_rad_s == 0.5
     assert held.joints[1].range_rad == (-3.0, 0.7)
     assert held.motion.workspace_m == ((0.301, -0.399, 0.015), (0.64, 0.43, 0.32))
-    assert (held.motion.force_limit_n, held.motion.impact_limit_n) == (200.0, 700.0)
+    assert (held.motion.hard_force_n, held.motion.force_limit_n, held.motion.impact_limit_n) == (80.0, 200.0, 700.0)
     assert held.tool.speed_m_s == (0.02, 0.1)
 
 

@@ -73,6 +73,7 @@ ARMS = [
     case("heights order", "arm", ["motion", "heights_m"], [0.3, 0.2], "motion.heights_m", "the lesser value first", "0.3 and 0.2"),
     case("tips in the table", "arm", ["motion", "heights_m"], [0.01, 0.2], "motion.heights_m[0]", "at least 0.019", "0.01"),
     case("short leash", "arm", ["motion", "leash_m"], 0.01, "motion.leash_m", "at least max_step_m", "0.01"),
+    case("hard push above limit", "arm", ["motion"], {"workspace_m": [[0, 0, 0], [1, 1, 1]], "hard_force_n": 250}, "motion.hard_force_n", "at least contact_force_n = 15 and less than force_limit_n = 250", "250"),
     case("contact above limit", "arm", ["motion"], {"workspace_m": [[0, 0, 0], [1, 1, 1]], "contact_force_n": 9, "force_limit_n": 5}, "motion.contact_force_n", "less than force_limit_n = 5", "9"),
     case("grip force", "arm", ["tool", "grip_force_n"], 500, "tool.grip_force_n", "a force from 20 to 235", "500"),
     case("force order", "arm", ["tool", "force_n"], [50, 40], "tool.force_n", "the lesser value first", "50 and 40"),

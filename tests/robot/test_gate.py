@@ -340,7 +340,7 @@ def test_each_limit_of_the_profile_latches_the_gate(arm, name, changes, joint, s
     assert len(arm.commands) == (expected is None)
 
 
-@pytest.mark.parametrize(("force_n", "is_sent"), [(15.0, False), (math.nextafter(15.0, 16.0), True)])
+@pytest.mark.parametrize(("force_n", "is_sent"), [(90.0, False), (math.nextafter(90.0, 91.0), True)])
 @pytest.mark.parametrize(
     ("by_rad", "reason"), [((0.02,), Reason.JOINT_ACCELERATION), ((0.0007, 0.0021, 0.0042, 0.0064), Reason.PART_SPEED)]
 )

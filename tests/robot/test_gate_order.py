@@ -204,7 +204,7 @@ def test_speeds_of_parts_are_those_from_the_last_command_to_the_next():
 def test_what_gives_way_to_where_it_is_measured_is_not_too_fast():
     gate = made(held=envelope(0.01, name="attended", joints=FREE))
     pushed = turned(0.02)
-    force_n = (0.0, 0.0, LIMITS.contact_n + 1.0)
+    force_n = (0.0, 0.0, LIMITS.hard_n + 1.0)
     assert gate.write(command(turned(0.015)), arm_state(pushed, force_n=force_n), now_ns=0) is None
 
 

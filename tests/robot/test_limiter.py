@@ -115,3 +115,18 @@ def test_slowed_to_a_share_it_brakes_within_its_limits_and_stays_there():
     assert (np.abs(np.diff(path, 3, axis=0)).max(0) / DT**3 <= np.array(LIMITS.jerk) * (1 + 1e-6)).all()
     limiter.slow_to(1.0)
     assert np.abs(np.diff(run(limiter, 60), axis=0)).max() / DT > 0.9
+
+
+@pytest.mark.parametrize("is_kept", [True, False])
+def test_a_brake_that_a_limit_begins_anew_in_every_tick_is_built_up_only_where_it_is_kept(is_kept):
+    dt, speed = 0.002, 0.25
+    one = Limiter(AxisLimits(speed=(1.0,), acceleration=(3.0,), jerk=(100.0,)), tick_s=dt)
+    places = [0.0, speed * dt, 2.0 * speed * dt]
+    one.go_on(*([x] for x in places[-3:]))
+    asked = []
+    for _ in range(10):  # held at this speed, tick after tick, with the target behind
+        one.aim([-0.2])
+        asked.append((one.step()[0] - places[-1]) / dt)
+        places.append(places[-1] + speed * dt)
+        one.go_on(*([x] for x in places[-3:]), is_braking_kept=is_kept)
+    assert (asked[-1] < speed - 5.0 * (speed - asked[0])) == is_kept

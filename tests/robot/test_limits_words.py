@@ -42,6 +42,7 @@ def test_every_limit_is_the_one_that_file_and_arm_give():
         tip_min_m=0.125 + motion.table_clearance_m,
         tracking_error_rad=motion.tracking_error_rad,
         contact_n=motion.contact_force_n,
+        hard_n=motion.hard_force_n,
         force_max_n=motion.force_limit_n,
         impact_max_n=motion.impact_limit_n,
         opening_m=(0.0, tool.stroke_m),

@@ -17,7 +17,7 @@ DT = 0.01
 KINEMATICS = Kinematics(ARM)
 START = (0.42, 0.0, 0.21)
 Q_START = KINEMATICS.solve(START, ARM.home_rad)
-CONTACT = ARM.motion.contact_force_n
+CONTACT, HARD = ARM.motion.contact_force_n, ARM.motion.hard_force_n
 
 
 class Perfect:
@@ -113,18 +113,19 @@ def test_the_workspace_and_the_table_stop_the_target(arm):
     assert arm.tcp[2] - ARM.tool.tip_below_tcp_m >= ARM.motion.table_clearance_m
 
 
-def test_a_push_stops_a_descent_at_once_and_is_reported(arm):
+@pytest.mark.parametrize(("force_n", "most_m"), [(CONTACT + 1.0, 6e-3), (HARD + 1.0, 2e-3)])
+def test_a_push_stops_a_descent_as_joints_brake_or_at_once_if_it_is_hard_and_is_reported(arm, force_n, most_m):
     for _ in range(12):
         arm.step(go(distance=0.0, height=0.03))
     z = arm.tcp[2]
-    arm.force = (0.0, 0.0, CONTACT + 1.0)
+    arm.force = (0.0, 0.0, force_n)
     limiters = arm.step(go(distance=0.0, height=0.03))
     assert "contact" in limiters
     assert arm.mover.is_in_contact
-    assert arm.tcp[2] == pytest.approx(z, abs=2e-3)
+    assert arm.tcp[2] == pytest.approx(z, abs=most_m)
     for _ in range(10):
         arm.step(go(distance=0.0, height=0.03))
-    assert arm.tcp[2] > z - 2e-3
+    assert arm.tcp[2] > z - most_m
     arm.force = (0.0, 0.0, 0.0)
     arm.step(go(distance=0.0, height=0.21))
     assert not arm.mover.is_in_contact
@@ -135,7 +136,7 @@ def test_falling_back_from_a_push_keeps_every_joints_speed(arm):
     path = [arm.q]
     mover.begin_step(go(distance=0.0, height=0.03), arm_state(measured, tcp_m=START), duration_s=0.2)
     path += [mover.tick(arm_state(measured, tcp_m=START)) for _ in range(20)]
-    pushed = arm_state(measured, tcp_m=START, force_n=(0.0, 0.0, CONTACT + 1.0))
+    pushed = arm_state(measured, tcp_m=START, force_n=(0.0, 0.0, HARD + 1.0))
     path += [mover.tick(pushed) for _ in range(6)]
     assert (np.abs(np.diff(path, axis=0)).max(0) <= [DT * j.speed_rad_s for j in ARM.joints]).all()
     assert path[-1] == pytest.approx(measured, abs=2e-3)

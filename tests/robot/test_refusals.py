@@ -31,6 +31,7 @@ LIMITS = GateLimits(
     tip_min_m=0.25,
     tracking_error_rad=0.25,
     contact_n=15.0,
+    hard_n=90.0,
     force_max_n=250.0,
     impact_max_n=700.0,
     opening_m=(0.0, 0.5),

@@ -32,12 +32,25 @@ from sim_twin.readings import Reading
 
 SHORT = 40
 SPEEDS = ("command_tcp_speed", "command_flange_speed", "command_elbow_speed", "elbow_speed", "command_acceleration")
+GIVEN_WAY = (*SPEEDS, "command_stop_acceleration", "command_stop_jerk")
 MENDED = (
-    pytest.param(2400, SPEEDS, id="writes that give way to nothing"),
-    pytest.param(721, SPEEDS, id="joints that outran the elbow"),
-    pytest.param(3036, SPEEDS, id="a search for the base column", marks=pytest.mark.slow),
+    pytest.param("attended", 2400, SPEEDS, id="writes that give way to nothing"),
+    pytest.param("attended", 721, SPEEDS, id="joints that outran the elbow"),
+    pytest.param("attended", 3036, SPEEDS, id="a search for the base column", marks=pytest.mark.slow),
+    pytest.param("attended", 588, GIVEN_WAY, id="a light push that was fallen back from at once"),
+    pytest.param("unattended", 799, GIVEN_WAY, id="a light push again and again", marks=pytest.mark.slow),
+    pytest.param("attended", 922, ("steady_force",), id="a bare pad on a button's rim"),
+    pytest.param("attended", 2487, ("steady_force",), id="a pad on a rim, written", marks=pytest.mark.slow),
+    pytest.param("unattended", 1376, ("steady_force",), id="a pad on a rim, at a fence", marks=pytest.mark.slow),
+    pytest.param("unattended", 2043, ("steady_force",), id="a pad on a rim, no load", marks=pytest.mark.slow),
+    pytest.param("unattended", 2536, ("steady_force",), id="a pad on a rim, loaded", marks=pytest.mark.slow),
+    pytest.param("attended", 747, ("grip_opening",), id="fingers pressed apart"),
+    pytest.param("unattended", 747, ("grip_opening",), id="fingers pressed apart, faster", marks=pytest.mark.slow),
+    pytest.param("unattended", 791, ("grip_opening",), id="fingers swung apart, loaded", marks=pytest.mark.slow),
+    pytest.param("unattended", 1839, ("grip_opening",), id="fingers swung apart, at a box", marks=pytest.mark.slow),
+    pytest.param("unattended", 2337, ("grip_opening",), id="fingers swung apart, circling", marks=pytest.mark.slow),
 )
-"""Streams of the attended battery, seed 0, and limits that were broken there."""
+"""Streams of the batteries, seed 0, and limits that were broken there."""
 
 
 @pytest.fixture(scope="module")
@@ -292,8 +305,10 @@ def test_each_limit_weakened_alone_by_a_twentieth_is_told(resolved, mutation, pr
     assert outcome.is_caught, outcome
 
 
-@pytest.mark.parametrize(("number", "kept"), MENDED)
-def test_a_stream_that_broke_a_limit_keeps_it(attended, number, kept):
-    came, _ = rerun(attended, number)
+@pytest.mark.parametrize(("profile", "number", "kept"), MENDED)
+def test_a_stream_that_broke_a_limit_keeps_it(attended, resolved, profile, number, kept):
+    setups = {"attended": attended, "unattended": setup_of(resolved)}
+    assert setups[profile].profile.name == profile
+    came, _ = rerun(setups[profile], number)
     assert [b for b in came.broken if b.limit in kept] == []
     assert {r.limit for r in came.readings} >= set(kept)

@@ -76,7 +76,9 @@ def test_letting_go_is_never_late():
 def pair():
     """A station on the twin, and its shadow whose arm may be pushed less: it stops first."""
     resolved = resolve(rig="twin", scenario="paper")
-    motion = msgspec.structs.replace(resolved.arm.motion, contact_force_n=1e4, force_limit_n=60.0, impact_limit_n=60.0)
+    motion = msgspec.structs.replace(
+        resolved.arm.motion, contact_force_n=1e4, hard_force_n=1e4, force_limit_n=60.0, impact_limit_n=60.0
+    )
     timid = msgspec.structs.replace(resolved, arm=msgspec.structs.replace(resolved.arm, motion=motion))
     station, shadow = build_station(resolved), build_shadow(timid)
     SimulatedOperator().arm_once(station)
