@@ -123,7 +123,8 @@ def ping(
                 typer.echo(msgspec.json.encode(answers).decode())
             else:
                 for answer in answers:
-                    where = "this machine" if answer.is_same_clock else "another machine"
+                    off = f", its clock {answer.offset_ms:+.2f} ± {answer.offset_within_ms:.2f} ms from ours"
+                    where = "this machine" if answer.is_same_clock else f"another machine{off}"
                     typer.echo(
                         f"{answer.source} ({answer.role}, {where}): {answer.round_trip_ms:.2f} ms there and back"
                     )
