@@ -59,7 +59,7 @@ class HealthBook:
         heard.most_late_ms = max(heard.most_late_ms, health.late_ms)
         heard.most_mb = max(heard.most_mb, health.rss_mb)
         heard.is_same_clock = health.clock == self._clock
-        heard.health, heard.heard_s = health, self._now_s()
+        heard.health, heard.heard_s = health, None if health.is_leaving else self._now_s()
 
     def age_s(self, name: str) -> float | None:
         """Return how long ago a process was heard; None where it has not been since it was started."""

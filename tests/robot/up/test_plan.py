@@ -63,8 +63,9 @@ class Book:
         for pid, name in enumerate(("twin", "robot")):
             self.book.begin(name, pid)
 
-    def say(self, name, pid=None):
-        told = Health(pid=("twin", "robot").index(name) if pid is None else pid, clock=7, now_ns=0, rate_hz=1.0)
+    def say(self, name, pid=None, *, is_leaving=False):
+        own = ("twin", "robot").index(name) if pid is None else pid
+        told = Health(pid=own, clock=7, now_ns=0, rate_hz=1.0, is_leaving=is_leaving)
         origin = Origin(schema=b"", clock=7, begun_ns=0, source=name)
         envelope = Envelope(origin=origin, sequence=0, stamp_ns=0)
         self.book.take(Received(message=told, envelope=envelope, arrived_ns=0, age_ns=0))
@@ -79,6 +80,14 @@ def test_a_process_is_silent_beyond_its_time_and_not_before_it_was_heard(limit_s
     assert not told.book.is_silent("robot", for_s=limit_s, hub=None)
     told.now_s += 0.01
     assert told.book.is_silent("robot", for_s=limit_s, hub=None)
+
+
+def test_a_process_that_said_that_it_leaves_is_not_silent():
+    told = Book()
+    told.say("robot")
+    told.say("robot", is_leaving=True)
+    told.now_s += 10.0
+    assert not told.book.is_silent("robot", for_s=SILENT_S, hub=None)
 
 
 def test_while_the_hub_is_silent_nobody_else_is_blamed():
