@@ -56,12 +56,10 @@ def up(
     logs = Logs(folder / "logs")
     supervisor = Supervisor(plans, make_bus=make_bus, logs=logs, rig=found.name, tell=tell)
     shown: AbstractContextManager[Live | None] = (
-        Live(console=console, auto_refresh=False) if console.is_terminal else nullcontext()
+        Live(console=console, refresh_per_second=4) if console.is_terminal else nullcontext()
     )
     with StopRequest() as end, shown as live:
-        summary = supervisor.run(
-            end, look=lambda: None if live is None else live.update(status_table(supervisor), refresh=True)
-        )
+        summary = supervisor.run(end, look=lambda: None if live is None else live.update(status_table(supervisor)))
     logs.close()
     if json:
         typer.echo(msgspec.json.encode(summary).decode())
