@@ -6,7 +6,7 @@ from msgspec import Meta
 
 from config.values import Name, Section
 
-__all__ = ["DEFAULT_LIMITS", "PlantExpected", "Rig", "RigCamera"]
+__all__ = ["DEFAULT_LIMITS", "NodeStart", "PlantExpected", "Rig", "RigCamera"]
 
 DEFAULT_LIMITS = "ur5e_parallel_jaw_85"
 
@@ -30,6 +30,17 @@ class RigCamera(Section, frozen=True, kw_only=True):
     """Its lens and place, as `autotelic calibrate` wrote them."""
     colours: Annotated[str, Meta(min_length=1, max_length=500)]
     """How the scenario's things look through it, as `autotelic perception learn` wrote it."""
+
+
+class NodeStart(Section, frozen=True, kw_only=True):
+    """One process of a rig, as `autotelic up` starts it."""
+
+    name: Annotated[str, Meta(pattern=r"^[a-z][a-z0-9_]{0,15}\Z")]
+    """Its source on the bus."""
+    kind: Annotated[str, Meta(pattern=r"^(hub|robot|job|other)\Z")] = "other"
+    """The bus's hub, what holds the arm, or what commands it and whose end is the end of all."""
+    command: Annotated[tuple[str, ...], Meta(min_length=1)]
+    """Words of an `autotelic` command; {rig}, {scenario}, {address}, {bus}, {keys}, {cell} and {out} are filled in."""
 
 
 class Rig(Section, frozen=True, kw_only=True):
@@ -64,6 +75,8 @@ class Rig(Section, frozen=True, kw_only=True):
     """Zenoh endpoint where the twin's process listens; with it the arm is held by a servo process of its own."""
     keys: Annotated[str, Meta(min_length=1, max_length=500)] | None = None
     """Folder of certificates (`autotelic keys`) for a bus at tls/HOST:PORT, from the rig's file on."""
+    nodes: tuple[NodeStart, ...] = ()
+    """What `autotelic up` starts, in this order."""
     expected: PlantExpected
     tick_s: Annotated[float, Meta(ge=0.002, le=0.05)] = 0.01
     physics_s: Annotated[float, Meta(ge=0.0005, le=0.01)] = 0.002

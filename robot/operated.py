@@ -11,7 +11,7 @@ from time import sleep
 from types import TracebackType
 from typing import Protocol
 
-from robot.errors import RobotConfigError, RobotError, WireError
+from robot.errors import NotEngagedError, RobotConfigError, RobotError, WireError
 from robot.messages import Intent, Percept, StationMode, StationSpec, StationState, StepResult
 from robot.safety import Armable, Operator, TooManyLatchesError
 from robot.station import Station
@@ -105,7 +105,7 @@ class OperatedStation:
                 is_down = self._station.state.mode in (StationMode.LATCHED, StationMode.DISARMED)
                 is_new = self._station.n_latches > n_latches
                 n_failed = 0 if is_new else n_failed + 1
-                is_borne = is_new or (isinstance(error, WireError) and n_failed < MOST_FAILED)
+                is_borne = is_new or (isinstance(error, WireError | NotEngagedError) and n_failed < MOST_FAILED)
                 if self._operator is None or not is_down or not is_borne:
                     raise
             else:

@@ -1,4 +1,4 @@
-"""`autotelic bus`: look at a running rig's bus. Writes nothing. The edge."""
+"""`autotelic bus`: look at a running rig's bus, or say stop on it. Writes nothing else. The edge."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -123,12 +123,32 @@ def ping(
                 typer.echo(msgspec.json.encode(answers).decode())
             else:
                 for answer in answers:
-                    where = "this machine" if answer.is_same_clock else "another machine"
+                    off = f", its clock {answer.offset_ms:+.2f} ± {answer.offset_within_ms:.2f} ms from ours"
+                    where = "this machine" if answer.is_same_clock else f"another machine{off}"
                     typer.echo(
                         f"{answer.source} ({answer.role}, {where}): {answer.round_trip_ms:.2f} ms there and back"
                     )
     if not n_answers:
         _nothing_came("bus/ping")
+
+
+@app.command()
+def stop(
+    rig: RigOption = "virtual_lab",
+    bus: BusOption = "",
+    seconds: Annotated[float, typer.Option(min=0.1, help="How long to say it at most.")] = 5.0,
+) -> None:
+    """Stop the arm that a robot node holds: said until it is confirmed. Exit code 1 if nobody confirms it."""
+    from robot.node.stop_caller import StopCaller  # stands on this room
+
+    with _joined(rig, bus) as joined:
+        caller = StopCaller(joined, by="autotelic bus stop")
+        took_s = caller.stop(within_s=seconds)
+        caller.close()
+    if took_s is None:
+        typer.echo(f"error: stop: nobody confirmed it within {seconds:g} s: look at the arm", err=True)
+        raise typer.Exit(1)
+    typer.echo(f"stopped, confirmed after {1e3 * took_s:.0f} ms")
 
 
 def _follow(topic: str, rig: str, bus: str, seconds: float, line: Callable[[Listener[msgspec.Struct]], str]) -> None:

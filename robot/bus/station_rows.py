@@ -191,3 +191,5 @@ class Health(msgspec.Struct, frozen=True, kw_only=True):
     last_error: str = ""
     doing: str = ""
     """In words."""
+    is_leaving: bool = False
+    """It leaves the bus now, and its silence from now on means nothing."""

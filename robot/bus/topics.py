@@ -63,7 +63,7 @@ class Pong(msgspec.Struct, frozen=True, kw_only=True):
     clock: int
     """Processes with the same number have the same monotonic clock: they run on one machine."""
     now_ns: int
-    """Of that clock."""
+    """Of that clock, when it answered."""
 
 
 COMMANDERS = (Role.LEARNING, Role.TELEOP)

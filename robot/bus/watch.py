@@ -40,6 +40,10 @@ class Answer(msgspec.Struct, frozen=True, kw_only=True):
     role: str
     round_trip_ms: float
     is_same_clock: bool
+    offset_ms: float = 0.0
+    """Its clock less ours, when it answered: half the round trip is taken for the way back."""
+    offset_within_ms: float = 0.0
+    """It may be off by so much, whichever way took longer."""
 
 
 class Seen(msgspec.Struct, frozen=True, kw_only=True):
@@ -97,12 +101,14 @@ def ping_all(bus: Bus) -> tuple[Answer, ...]:
     begun_ns = monotonic_ns()
 
     def note(pong: Pong) -> None:
-        round_trip_ms = (monotonic_ns() - begun_ns) / 1e6
+        now_ns = monotonic_ns()
+        round_trip_ms = (now_ns - begun_ns) / 1e6
         if pong.source != bus.source:
             answers.append(
                 Answer(
                     source=pong.source, role=pong.role, round_trip_ms=round_trip_ms,
                     is_same_clock=pong.clock == bus.clock,
+                    offset_ms=(pong.now_ns - (begun_ns + now_ns) / 2.0) / 1e6, offset_within_ms=round_trip_ms / 2.0,
                 )
             )  # fmt: skip
 

@@ -47,6 +47,10 @@ class Admission:
         self.refused = why
         return why
 
+    def is_repeat(self, lease: str, number: int) -> bool:
+        """Tell whether this is what was let in last, once more: its answer may be lost."""
+        return bool(self.lease) and lease == self.lease and 0 < number == self._number
+
     def why_not(self, lease: str, number: int, *, stamp_ns: int, age_ns: int | None) -> str | None:
         """Return why a command is not let in, None where it is, and its number is used up.
 

@@ -1,4 +1,8 @@
-"""Questions to a robot node that may be away for a while: it is started anew, or the bus's hub is."""
+"""Questions to a robot node that may be away for a while: it is started anew, or the bus's hub is.
+
+What needs no lease is asked again until somebody answers. What is asked under one is asked once: a robot node that was
+started anew gave no such lease, and one that did has used the question's number up.
+"""
 
 from collections.abc import Callable
 from time import monotonic, sleep
@@ -75,9 +79,10 @@ class NodeAsker:
             asker.ask_each(request, answers.append)
             if answers:
                 return answers[0]
-            if monotonic() > end_s:
+            if request.lease or monotonic() > end_s:
+                within = "" if request.lease else f" within {self._wait_s:g} s"
                 raise BusError(
-                    f"station: expected a robot node that answers within {self._wait_s:g} s, none came; does "
+                    f"station: expected a robot node that answers{within}, none did; does "
                     "`autotelic up` run, or `autotelic node robot`?"
                 )
             self._pause(AGAIN_S)

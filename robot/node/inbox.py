@@ -37,7 +37,7 @@ class Inbox:
         self._command: Command | None = None
         self._refused: deque[Refused] = deque(maxlen=N_REFUSED)
         self._stops: deque[StopAsk] = deque(maxlen=N_STOPS)
-        self._has_beat = False
+        self._has_beat = self._is_repeated = False
         self._open = (
             bus.subscriber(STOP, self._take_stop), bus.subscriber(INTENT, self._take), bus.subscriber(BEAT, self._hear)
         )  # fmt: skip
@@ -45,7 +45,7 @@ class Inbox:
     @property
     def n_waiting(self) -> int:
         """Things that nobody has looked at."""
-        return len(self._stops) + len(self._refused) + (self._command is not None)
+        return len(self._stops) + len(self._refused) + (self._command is not None) + self._is_repeated
 
     def wait(self, seconds: float) -> None:
         """Wait until something is there, at most so long."""
@@ -71,6 +71,11 @@ class Inbox:
         has_beat, self._has_beat = self._has_beat, False
         return has_beat
 
+    def is_repeated(self) -> bool:
+        """Whether the command that was let in last came once more since the last look."""
+        is_repeated, self._is_repeated = self._is_repeated, False
+        return is_repeated
+
     def begin(self, lease: str) -> None:
         """Let in what comes under a new lease alone; what came under another is gone."""
         with self._came:
@@ -85,11 +90,15 @@ class Inbox:
     def _take(self, received: Received[Command]) -> None:
         command = received.message
         with self._came:
+            if self._admission.is_repeat(command.lease, command.number):
+                self._is_repeated = True
+                self._came.notify_all()
+                return
             why = self._admission.why_not(
                 command.lease, command.number, stamp_ns=received.envelope.stamp_ns, age_ns=received.age_ns
             )
             if why is None:
-                self._command, self._has_beat = command, True
+                self._command, self._has_beat, self._is_repeated = command, True, False
             else:
                 self._refused.append(Refused(command, why))
             self._came.notify_all()

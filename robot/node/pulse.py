@@ -52,12 +52,13 @@ class Pulse:
         self._n_errors += 1
         self._error = error
 
-    def tell(self, *, clock: int, rss_mb: float) -> Health:
+    def tell(self, *, clock: int, rss_mb: float, is_leaving: bool = False) -> Health:
         """Return how it went since the last time.
 
         Args:
             clock: the number of the clock.
             rss_mb: memory that the process holds.
+            is_leaving: it says nothing more after this.
         """
         now_ns = self._now_ns()
         n, late_ns, span_ns = self._n - self._n_told, self._late_ns, max(now_ns - self._told_ns, 1)
@@ -67,7 +68,7 @@ class Pulse:
         return Health(
             pid=getpid(), clock=clock, now_ns=now_ns, rate_hz=n * 1e9 / span_ns, target_hz=self._target_hz,
             late_ms=max(0.0, late_ns / 1e6), queue=self.queue, rss_mb=rss_mb, n_errors=self._n_errors,
-            last_error=self._error, doing=self.doing,
+            last_error=self._error, doing=self.doing, is_leaving=is_leaving,
         )  # fmt: skip
 
 
@@ -95,11 +96,16 @@ class HealthTeller:
         self._thread.start()
 
     def close(self) -> None:
-        """End. Idempotent."""
-        self._is_over.set()
-        self._thread.join()
+        """Tell that it leaves. Idempotent."""
+        if not self._is_over.is_set():
+            self._is_over.set()
+            self._thread.join()
+            self._tell(is_leaving=True)
 
     def _run(self) -> None:
         while not self._is_over.wait(TELL_S):
-            with suppress(BusError):  # the bus is closed: who looks for this process finds it silent
-                self._publisher.put(self._pulse.tell(clock=self._clock, rss_mb=memory_mb()))
+            self._tell(is_leaving=False)
+
+    def _tell(self, *, is_leaving: bool) -> None:
+        with suppress(BusError):  # the bus is closed: who looks for this process finds it silent
+            self._publisher.put(self._pulse.tell(clock=self._clock, rss_mb=memory_mb(), is_leaving=is_leaving))

@@ -60,6 +60,8 @@ __all__ = ["RemoteStation"]
 BEAT_S, LIFE_S = 0.2, 2.0
 ANSWER_S = 2.0
 """How much longer than it lasts a time step may take to be answered."""
+AGAIN_S = 0.03
+"""A command is sent again after so long without an answer."""
 STOP_S = 5.0
 AT_HOME = "a real arm is armed in the process that holds it: what its cell shows is answered there, no bus carries it"
 
@@ -77,6 +79,7 @@ class RemoteStation:
     def __init__(
         self, bus: Bus, *, asker: NodeAsker, is_driven: bool = False, now_ns: Callable[[], int] = monotonic_ns
     ) -> None:
+        self._now_ns = now_ns
         self._bus, self._asker, self._is_driven = bus, asker, is_driven
         self._source = f"{bus.source}:{secrets.token_hex(2)}"
         self._life_s = LIFE_S
@@ -265,13 +268,11 @@ class RemoteStation:
         self._number += 1
         number = self._number
         crossing = _crossing(intent)
+        command = Command(lease=self._lease, number=number, intent=crossing, duration_s=duration_s)
         try:
-            self._intents.put(Command(lease=self._lease, number=number, intent=crossing, duration_s=duration_s))
+            done = self._answer_to(command, within_s=_finite(duration) + ANSWER_S)
         except BusError as error:
             return self._void(crossing, str(error))
-        with self._came:
-            self._came.wait_for(lambda: self._is_answered(number), _finite(duration) + ANSWER_S)
-            done = self._done if self._is_answered(number) else None
         if done is None:
             return self._void(crossing, f"expected an answer of the robot node within {ANSWER_S:g} s, none came")
         return self._result(done, intent, crossing)
@@ -339,6 +340,21 @@ class RemoteStation:
         self._was_engaged = True
         self._percept, self._measured = told.percept, told.measured
         return told
+
+    def _answer_to(self, command: Command, *, within_s: float) -> StepDone | None:
+        """Ask for a time step until it is answered; None where it is not in time.
+
+        A link that is full drops messages, the command or its answer. It is the same command each time, stamped when
+        it was made: the robot node carries it out once, or not at all once it has grown old.
+        """
+        made_ns = self._now_ns()
+        end_ns = made_ns + round(within_s * 1e9)
+        while self._now_ns() < end_ns:
+            self._intents.put(command, stamp_ns=made_ns)
+            with self._came:
+                if self._came.wait_for(lambda: self._is_answered(command.number), AGAIN_S):
+                    return self._done
+        return None
 
     def _is_answered(self, number: int) -> bool:
         done = self._done

@@ -89,6 +89,8 @@ class RobotNode:
         self._begun, self._revision = secrets.randbits(48), 0
         self._stops: deque[int] = deque(maxlen=N_STOPS)
         self._is_final = False
+        self._last_step: StepDone | None = None
+        """The answer that is given again where it seems to be lost."""
         self._reported: tuple[object, ...] | None = None
         self._report_ns = self._measure_ns = 0
         self._pause_ns = MEASURE_NS
@@ -114,6 +116,8 @@ class RobotNode:
             if asked is not None:
                 self._answer(asked)
                 self._carry_out_stops()
+        if self._inbox.is_repeated() and self._last_step is not None:
+            self._put(self._steps, self._last_step)
         command = self._inbox.command()
         if command is not None:
             self._step(command)
@@ -169,13 +173,12 @@ class RobotNode:
         self, command: Command, *, result: StepResult | None = None, measured: ArmState | None = None,
         failed: Failed | None = None,
     ) -> None:  # fmt: skip
-        self._put(
-            self._steps,
-            StepDone(
-                lease=command.lease, number=command.number, report=self._report(), result=result, measured=measured,
-                failed=failed,
-            ),
+        done = StepDone(
+            lease=command.lease, number=command.number, report=self._report(), result=result, measured=measured,
+            failed=failed,
         )  # fmt: skip
+        self._last_step = done
+        self._put(self._steps, done)
 
     def _publish_parts(self, result: StepResult, measured: ArmState) -> None:
         """Tell whoever watches what came of a time step, one topic each."""
@@ -188,7 +191,11 @@ class RobotNode:
 
     def _say_refused(self, refused: Refused) -> None:
         self.pulse.fail(refused.why)
-        self._publish_step(refused.command, failed=Failed(kind=NotEngagedError.__name__, message=refused.why))
+        command, failed = refused.command, Failed(kind=NotEngagedError.__name__, message=refused.why)
+        self._put(
+            self._steps,
+            StepDone(lease=command.lease, number=command.number, report=self._report(), failed=failed),
+        )
 
     # ----------------------------------------------------------------------------------------------------- questions
 

@@ -12,6 +12,8 @@ from robot.hal.rtde_plant import RtdePlant
 from robot.hal.sight import Observer, Watched
 from robot.hal.ur_observer import UrObserver
 from robot.local_station import LocalStation
+from robot.node import RemoteStation
+from robot.node.served import ServedStation
 from robot.person import Person, PersonOperator, TerminalPerson
 from robot.safety import Armable, Operator
 from robot.station import Station
@@ -43,6 +45,7 @@ __all__ = [
     "PERCEPTIONS",
     "PERSONS",
     "PLANTS",
+    "SERVED",
     "STATIONS",
     "WATCHED",
 ]
@@ -54,12 +57,13 @@ WATCHED: tuple[type[Watched], ...] = (RtdePlant,)
 ATTENDANTS: tuple[type[Attendant], ...] = (TerminalAttendant, NobodyAsked)
 CAMERAS: tuple[type[Camera], ...] = (FolderCamera, RenderedCamera)
 CLOCKS: tuple[type[Clock], ...] = (LockStepClock, RtdeClock)
-STATIONS: tuple[type[Station], ...] = (LocalStation,)
-ARMABLES: tuple[type[Armable], ...] = (LocalStation,)
+STATIONS: tuple[type[Station], ...] = (LocalStation, RemoteStation)
+SERVED: tuple[type[ServedStation], ...] = (LocalStation,)
+ARMABLES: tuple[type[Armable], ...] = (LocalStation, RemoteStation)
 OPERATORS: tuple[type[Operator], ...] = (SimulatedOperator, PersonOperator)
 PERSONS: tuple[type[Person], ...] = (TerminalPerson,)
 DEVICES: tuple[type[Device], ...] = (Keyboard, Gamepad, SpaceMouse, ScriptedDevice)
-DRIVEN: tuple[type[DrivenStation], ...] = (LocalStation,)
+DRIVEN: tuple[type[DrivenStation], ...] = (LocalStation, RemoteStation)
 PACES: tuple[type[Pace], ...] = (Unpaced, WallPace)
 PERCEPTIONS: tuple[type[Perception], ...] = (GroundTruthPerception,)
 PERCEIVERS: tuple[type[Perceives], ...] = (GroundTruthPerception,)

@@ -45,7 +45,7 @@ class Served:
     def __init__(self):
         rig = fake_rig()
         self.plant = FakePlant(arm=rig.arm, scenario=rig.scenario, rig=rig.rig)
-        self.pulse, self.ended_by = [0], None
+        self.pulse, self.halt, self.ended_by = [0], [0], None
         self.ours, theirs = Pipe()
         loop = TickLoop(
             arm=self.plant.arm, config=rig.arm, scenario=rig.scenario, rule_sets=rig.rule_sets, rig=rig.rig,
@@ -57,6 +57,7 @@ class Served:
             loop=loop,
             arm=rig.arm,
             pulse=self.pulse,
+            halt=self.halt,
             die=self.die,
             pin=CpuPin(0),
         )
@@ -134,6 +135,25 @@ def test_an_arm_lost_in_a_time_step_is_told_as_its_end(served):
     assert told.is_asked
     assert told.stride.verdict.reason == "stale_state"
     assert served.ended_by == "death"
+
+
+def test_a_stop_in_shared_memory_latches_at_the_next_tick(served):
+    """Amid a time step as between two: the pipe is not asked, and the process goes on, out of command."""
+    grip = GripCommand(opening_m=0.085, force_n=20.0, speed_m_s=0.15)
+    intent = Heading(heading_rad=0.0, distance_m=0.01, height_m=0.2)
+    served.ours.send_bytes(
+        msgspec.msgpack.encode(StrideRequest(intent=pack_intent(intent), grip=grip, n_ticks=1_000_000, sequence=1))
+    )
+    assert not served.ours.poll(0.05)
+    served.halt[0] = 1
+    told = served.hear()
+    assert (told.stride.verdict.reason, told.stride.verdict.is_latched) == ("stop", True)
+    assert told.is_asked
+    assert isinstance(served.ask(Stop()), Done)
+    served.halt[0] = 0
+    assert isinstance(served.ask(Engage()), Done)
+    assert isinstance(served.ask(Seed()), Seeded)
+    assert isinstance(served.ask(Close()), Done)
 
 
 def test_a_latch_that_crosses_a_time_step_on_the_way_answers_it_once(served, monkeypatch):

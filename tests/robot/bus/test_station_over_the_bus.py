@@ -2,7 +2,6 @@
 
 import math
 import socket
-import threading
 import time
 
 import msgspec
@@ -15,18 +14,18 @@ from robot.bus.topic import key_of
 from robot.bus.topics import ASK, INTENT, LAY_OUT
 from robot.errors import NotEngagedError, RobotConfigError, SafetyError
 from robot.messages import Heading, Hold, StationMode
-from robot.motion import AskedHand, HandReflexes
-from robot.node import NodeAsker, RemoteStation, RobotNode, StopCaller
+from robot.node import NodeAsker, RemoteStation, StopCaller
 from robot.node.remote_station import BEAT_S
 from robot.operated import OperatedStation
 from robot.rigs import build_station
 from robot.safety import Answer, AnsweredBy
 from sim_twin.operator import SimulatedOperator
+from tests.support.robot_node import SERIAL, Node
 from tests.support.stations import fake_rig
 
 pytestmark = pytest.mark.realtime
 
-HOST, SERIAL = "127.0.0.101", "4711"
+HOST = "127.0.0.101"
 GO = Heading(heading_rad=0.5, distance_m=0.02, height_m=0.2)
 
 
@@ -35,34 +34,6 @@ def until(is_true, timeout_s=10.0):
     while not is_true():
         assert time.monotonic() < end
         time.sleep(0.005)
-
-
-class Node:
-    """A robot node in a thread, over a fake arm in lock-step."""
-
-    def __init__(self, endpoint, *, is_hub=True):
-        rig = fake_rig()
-        self.local = build_station(rig)
-        self.bus = Bus(endpoint, serial=SERIAL, role=Role.ROBOT, is_hub=is_hub)
-        self.bus.open()
-        self.n_halts, self.is_over = 0, threading.Event()
-        self.node = RobotNode(
-            self.bus, self.local, scenario=rig.scenario.name, profile=rig.rig.profile, drive=self.drive, halt=self.halt
-        )
-        self.hands = {True: AskedHand(rig.arm), False: HandReflexes(arm=rig.arm, scenario=rig.scenario)}
-        self.thread = threading.Thread(target=self.node.run, args=(self.is_over.is_set,))
-        self.thread.start()
-
-    def drive(self, is_driven):
-        self.local.give_hand(self.hands[is_driven])
-
-    def halt(self):
-        self.n_halts += 1
-
-    def close(self):
-        self.is_over.set()
-        self.thread.join()
-        self.bus.close()
 
 
 @pytest.fixture
@@ -170,6 +141,7 @@ def test_whoever_comes_after_one_that_left_must_arm_anew(engaged, join, node):
     assert not other.step(GO).is_void
 
 
+@pytest.mark.slow
 def test_a_source_that_is_silent_for_its_lease_s_life_is_disarmed(node, join):
     station = join()
     station.take_lease("tester", life_ns=round(2.5 * BEAT_S * 1e9))
@@ -252,6 +224,7 @@ def test_a_captured_question_asked_again_does_nothing(engaged, endpoint):
     assert not engaged.step(GO).is_void
 
 
+@pytest.mark.slow
 def test_a_robot_node_that_is_gone_voids_the_step_and_one_that_comes_back_is_armed_anew(endpoint, monkeypatch):
     monkeypatch.setattr("robot.node.remote_station.ANSWER_S", 0.3)
     with Bus(endpoint, serial=SERIAL, role=Role.TWIN, is_hub=True):

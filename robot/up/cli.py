@@ -1,0 +1,80 @@
+"""`autotelic up RIG`: start a rig's processes and see to them until Ctrl-C or until the job is done. The edge."""
+
+from contextlib import AbstractContextManager, nullcontext
+from pathlib import Path
+from typing import Annotated
+
+import msgspec
+import typer
+from rich.console import Console
+from rich.live import Live
+
+from config.loader import resolve
+from config.resolved import Resolved
+from config.sources import read_source
+from robot.stop_request import StopRequest
+
+__all__ = ["up"]
+
+
+def up(
+    rig: Annotated[str, typer.Argument(help="A shipped rig's name or a file.")],
+    more: Annotated[list[str] | None, typer.Argument(help="Words for the job's command, after --.")] = None,
+    scenario: Annotated[str, typer.Option(help="A shipped scenario's name or a file.")] = "paper",
+    without: Annotated[list[str] | None, typer.Option("--without", help="A node that is left out.")] = None,
+    out: Annotated[Path | None, typer.Option(help="Folder for logs and run.  [default: runs/up-RIG]")] = None,
+    *,
+    json: Annotated[bool, typer.Option("--json", help="Print a summary as one JSON object at the end.")] = False,
+) -> None:
+    """Start a rig's processes, watch them, start again what ends, and end them on Ctrl-C: the arm first and last.
+
+    Words after -- go to the job: `autotelic up virtual_lab -- --epochs 50`. Exit code 0 if nothing went wrong, 3 if
+    something did and was mended, 1 if it was not.
+    """
+    from robot.bus.session import Bus
+    from robot.bus.topic import Role
+    from robot.up.logs import Logs
+    from robot.up.plan import plans_of
+    from robot.up.summary import Event
+    from robot.up.supervisor import Supervisor
+    from robot.up.table import status_table
+
+    resolved = resolve(rig=rig, scenario=scenario)
+    found = resolved.rig
+    folder = out or Path("runs") / f"up-{found.name}"
+    plans = plans_of(found, _values(resolved, rig, scenario, folder), without=without or (), more=more or ())
+    console = Console(stderr=True)
+
+    def tell(event: Event) -> None:
+        if not console.is_terminal:
+            typer.echo(f"{event.at_s:.2f} s, {event.node}: {event.what}", err=True)
+
+    def make_bus() -> Bus:
+        assert found.bus is not None, "a robot node has one"
+        return Bus(found.bus, serial=found.expected.serial, role=Role.VIEWER, source="supervisor", keys=found.keys)
+
+    logs = Logs(folder / "logs")
+    supervisor = Supervisor(plans, make_bus=make_bus, logs=logs, rig=found.name, tell=tell)
+    shown: AbstractContextManager[Live | None] = (
+        Live(console=console, refresh_per_second=4) if console.is_terminal else nullcontext()
+    )
+    with StopRequest() as end, shown as live:
+        summary = supervisor.run(end, look=lambda: None if live is None else live.update(status_table(supervisor)))
+    logs.close()
+    if json:
+        typer.echo(msgspec.json.encode(summary).decode())
+    else:
+        typer.echo(f"{summary.seconds:.0f} s, {len(summary.events)} events; logs in {summary.logs}", err=True)
+    raise typer.Exit(summary.exit_code)
+
+
+def _values(resolved: Resolved, rig: str, scenario: str, folder: Path) -> dict[str, str]:
+    """Return what stands for the names in braces; files as they are found from here."""
+    found, source = resolved.rig, read_source("rigs", rig)
+    cell = found.cell or ""
+    if "/" in cell and source.folder is not None:
+        cell = str(source.folder / cell)
+    return {
+        "rig": rig, "scenario": scenario, "address": found.address or "", "bus": found.bus or "",
+        "keys": found.keys or "", "cell": cell, "out": str(folder),
+    }  # fmt: skip

@@ -1,0 +1,263 @@
+"""Starts the processes of a rig, watches them, starts again what ended, and ends them all: the arm first and last.
+
+Nothing is armed here. A process that ended or froze has the arm stopped before it is started again; a robot node that
+was started again is disarmed.
+"""
+
+import signal
+from collections.abc import Callable
+from time import monotonic, sleep
+
+from robot.bus.clock_number import clock_number
+from robot.bus.errors import BusError
+from robot.bus.session import Bus
+from robot.bus.topics import HEALTH
+from robot.node.stop_caller import StopCaller
+from robot.up.child import Child
+from robot.up.logs import Logs
+from robot.up.plan import Backoff, NodePlan
+from robot.up.summary import Event, NodeSummary, Summary, Worst
+from robot.up.watch import GONE_S, SILENT_S, HealthBook
+
+__all__ = ["Supervisor"]
+
+LOOK_S = 0.05
+START_S = 60.0
+STOP_S, NOW_S = 5.0, 1.0
+JOB_S, END_S = 30.0, 10.0
+USAGE, INTERRUPTED = 2, 130
+
+
+class _Node:
+    """One process, over all its starts."""
+
+    def __init__(self, plan: NodePlan) -> None:
+        self.plan, self.backoff = plan, Backoff()
+        self.child: Child | None = None
+        self.code: int | None = None
+        self.n_starts = 0
+        self.again_s: float | None = None
+        """When it is started again."""
+        self.is_silent = self.is_over = False
+
+
+class Supervisor:
+    """Runs a rig's processes.
+
+    Args:
+        plans: what to start, in order.
+        make_bus: a bus to watch and to say stop on, not yet open.
+        logs: where words go.
+        rig: its name.
+        tell: told of every event.
+        now_s: the monotonic clock.
+    """
+
+    def __init__(
+        self, plans: tuple[NodePlan, ...], *, make_bus: Callable[[], Bus], logs: Logs, rig: str,
+        tell: Callable[[Event], object] = lambda _: None, now_s: Callable[[], float] = monotonic,
+    ) -> None:  # fmt: skip
+        self.nodes = {plan.name: _Node(plan) for plan in plans}
+        self._make_bus, self._logs, self._rig, self._tell, self._now_s = make_bus, logs, rig, tell, now_s
+        self._begun_s = now_s()
+        self._hub = next((plan.name for plan in plans if plan.kind == "hub"), None)
+        self._bus: Bus | None = None
+        self._stops: StopCaller | None = None
+        self.book = HealthBook(tuple(self.nodes), clock=clock_number(), now_s=now_s)
+        self.events: list[Event] = []
+        self._worst = Worst.NOTHING
+        self._first_s: float | None = None
+        self._last_s: float | None = None
+
+    def run(self, should_end: Callable[[], bool], *, look: Callable[[], object] = lambda: None) -> Summary:
+        """Start everything, and watch it until the job is over, something is given up, or one is told to end.
+
+        Args:
+            should_end: asked all the time.
+            look: called as often, to show how it is.
+        """
+        try:
+            if self._start_all(should_end, look):
+                while not should_end() and not self._is_over():
+                    self._look()
+                    look()
+                    sleep(LOOK_S)
+        finally:
+            self._end()
+        return self._summary()
+
+    # --------------------------------------------------------------------------------------------------------- start
+
+    def _start_all(self, should_end: Callable[[], bool], look: Callable[[], object]) -> bool:
+        for node in self.nodes.values():
+            self._start(node)
+            end_s = self._now_s() + START_S
+            while not self._is_up(node):
+                look()
+                if should_end():
+                    return False
+                if node.child is None or node.child.code is not None or self._now_s() > end_s:
+                    words = "" if node.child is None else node.child.last_line
+                    self._note(node, f"expected it to start within {START_S:g} s, it did not: {words}", Worst.FAILED)
+                    return False
+                sleep(LOOK_S)
+        return True
+
+    def _start(self, node: _Node) -> None:
+        node.n_starts += 1
+        node.again_s, node.is_silent = None, False
+        node.child = Child(node.plan, self._logs)
+        self.book.begin(node.plan.name, node.child.pid)
+        self._note(node, f"started as process {node.child.pid}")
+
+    def _is_up(self, node: _Node) -> bool:
+        """Whether it was heard; a job has some time of its own before it says anything."""
+        self._join()
+        return node.plan.kind == "job" or self.book.age_s(node.plan.name) is not None
+
+    def _join(self) -> None:
+        """Join the bus, once its hub is there."""
+        if self._bus is not None:
+            return
+        bus = self._make_bus()
+        try:
+            bus.open()
+        except BusError:
+            return
+        self._bus, self._stops = bus, StopCaller(bus, by="the supervisor")
+        self._health = bus.subscriber(HEALTH, lambda received: self.book.take(received))
+
+    # --------------------------------------------------------------------------------------------------------- watch
+
+    def _is_over(self) -> bool:
+        return any(node.is_over for node in self.nodes.values())
+
+    def _look(self) -> None:
+        for node in self.nodes.values():
+            child = node.child
+            if child is None:
+                if node.again_s is not None and self._now_s() >= node.again_s:
+                    self._start(node)
+            elif child.code is not None:
+                self._ended(node, child)
+            else:
+                self._listen(node, child)
+
+    def _listen(self, node: _Node, child: Child) -> None:
+        """Stop the arm where a process is silent, and end the process where it stays so."""
+        name = node.plan.name
+        if not self.book.is_silent(name, for_s=SILENT_S, hub=self._hub):
+            if node.is_silent:
+                node.is_silent = False
+                self._note(node, "heard again")
+            return
+        if not node.is_silent:
+            node.is_silent = True
+            self._note(node, f"silent for {SILENT_S:g} s: the arm is stopped", Worst.MENDED)
+            self._stop_arm()
+        if self.book.is_silent(name, for_s=GONE_S, hub=self._hub):
+            self._note(node, f"silent for {GONE_S:g} s: it is killed")
+            child.kill()
+
+    def _ended(self, node: _Node, child: Child) -> None:
+        code = node.code = child.code
+        child.wait(1.0)
+        node.child = None
+        if node.plan.kind == "job" and code == 0:
+            node.is_over = True
+            self._note(node, "finished")
+            return
+        how = f"killed by signal {-code}" if code is not None and code < 0 else f"ended with exit code {code}"
+        self._stop_arm()
+        delay_s = None if code == USAGE else node.backoff.delay_s(self._now_s())
+        if delay_s is None:
+            node.is_over = True
+            self._note(node, f"{how} ({child.last_line}): it is given up", Worst.FAILED)
+            return
+        node.again_s = self._now_s() + delay_s
+        self._note(node, f"{how} ({child.last_line}): it is started again in {delay_s:g} s", Worst.MENDED)
+
+    def _stop_arm(self) -> None:
+        """Say stop for a moment: whoever holds the arm may be what ended."""
+        self._say_stop(within_s=NOW_S, is_final=False)
+
+    def _say_stop(self, *, within_s: float, is_final: bool) -> float | None:
+        robots = [node for node in self.nodes.values() if node.plan.kind == "robot"]
+        is_there = any(node.child is not None and node.child.code is None for node in robots)
+        if self._stops is None or not is_there:
+            return None
+        try:
+            took_s = self._stops.stop(within_s=within_s, is_final=is_final)
+        except BusError:
+            took_s = None
+        self._note(robots[0], f"stop {'not confirmed' if took_s is None else f'confirmed after {1e3 * took_s:.0f} ms'}")
+        return took_s
+
+    # ----------------------------------------------------------------------------------------------------------- end
+
+    def _end(self) -> None:
+        """The arm first, then who commands it, the arm again, who holds it, and all else backwards."""
+        nodes = [node for node in self.nodes.values() if node.child is not None and node.child.code is None]
+        jobs = [node for node in nodes if node.plan.kind == "job"]
+        for node in jobs:
+            self._signal(node, signal.SIGINT)
+        self._first_s = self._say_stop(within_s=STOP_S, is_final=True)
+        for node in jobs:
+            self._await(node, JOB_S)
+        robots = [node for node in nodes if node.plan.kind == "robot"]
+        self._last_s = self._say_stop(within_s=STOP_S, is_final=True)
+        if robots and None in (self._first_s, self._last_s):
+            self._note(robots[0], "its stop was not confirmed: look at the arm", Worst.FAILED)
+        rest = [node for node in reversed(nodes) if node not in jobs and node not in robots]
+        for node in (*robots, *rest):
+            self._signal(node, signal.SIGINT)
+            self._await(node, END_S)
+        if self._stops is not None and self._bus is not None:
+            self._stops.close()
+            self._bus.close()
+
+    @staticmethod
+    def _signal(node: _Node, number: signal.Signals) -> None:
+        if node.child is not None:
+            node.child.send(number)
+            node.child.send(signal.SIGCONT)
+
+    def _await(self, node: _Node, seconds: float) -> None:
+        child = node.child
+        if child is None:
+            return
+        if not child.wait(seconds):
+            self._note(node, f"expected it to end within {seconds:g} s: it is killed", Worst.MENDED)
+            child.kill()
+        node.code = child.code
+        self._note(node, f"ended with exit code {node.code}")
+        if node.code not in (0, INTERRUPTED, -signal.SIGINT):
+            self._raise(Worst.MENDED)
+
+    def _note(self, node: _Node, what: str, worst: Worst = Worst.NOTHING) -> None:
+        event = Event(at_s=round(self._now_s() - self._begun_s, 3), node=node.plan.name, what=what)
+        self.events.append(event)
+        self._logs.write("supervisor", f"{event.node}: {event.what}")
+        self._tell(event)
+        self._raise(worst)
+
+    def _raise(self, worst: Worst) -> None:
+        order = (Worst.NOTHING, Worst.MENDED, Worst.FAILED)
+        self._worst = max(self._worst, worst, key=order.index)
+
+    def _summary(self) -> Summary:
+        nodes = []
+        for name, node in self.nodes.items():
+            heard = self.book[name]
+            nodes.append(
+                NodeSummary(
+                    name=name, n_starts=node.n_starts, exit_code=node.code, most_late_ms=heard.most_late_ms,
+                    most_mb=heard.most_mb, grown_mb=heard.most_mb - heard.first_mb,
+                    last_error="" if heard.health is None else heard.health.last_error,
+                )
+            )  # fmt: skip
+        first_ms, last_ms = (None if took_s is None else 1e3 * took_s for took_s in (self._first_s, self._last_s))
+        return Summary(
+            rig=self._rig, seconds=self._now_s() - self._begun_s, exit_code=int(self._worst), nodes=tuple(nodes),
+            events=tuple(self.events), stop_first_ms=first_ms, stop_last_ms=last_ms, logs=str(self._logs.folder),
+        )  # fmt: skip
