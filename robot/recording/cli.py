@@ -131,6 +131,23 @@ def merge(
 
 
 @app.command()
+def view(
+    session: Session,
+    out: Annotated[
+        Path | None, typer.Option("--out", "-o", help="Picture to write: png, svg or pdf.  [default: beside it]")
+    ] = None,
+    *,
+    begin: Annotated[float, typer.Option("--from", min=0.0, help="Seconds of the session's time.")] = 0.0,
+    end: Annotated[float | None, typer.Option("--to", help="Seconds; up to its end if left out.")] = None,
+) -> None:
+    """Draw joints and commands, the tool, distances, verdicts and decisions over the session's time."""
+    from robot.recording.view import save_view  # brings matplotlib
+
+    with SessionFile(session) as opened:
+        typer.echo(save_view(opened, out or session.with_suffix(".png"), from_s=begin, to_s=end))
+
+
+@app.command()
 def replay(
     session: Session,
     *,
