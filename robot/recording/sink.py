@@ -36,11 +36,11 @@ class Sink:
 
     def __init__(self, path: Path, *, may_wait: bool, now_s: Callable[[], float] = monotonic) -> None:
         self.path, self._may_wait, self._now_s = path, may_wait, now_s
+        if path.exists():
+            raise UnfitError(f"{path}: expected no file there yet; nothing is overwritten, name another")
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
             self._fd = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o644)
-        except FileExistsError as error:
-            raise UnfitError(f"{path}: expected no file there yet; nothing is overwritten, name another") from error
         except OSError as error:
             raise UnfitError(
                 f"{path}: expected a place to record to, {(error.strerror or str(error)).lower()}"
