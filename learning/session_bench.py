@@ -17,32 +17,42 @@ from mcap.writer import Writer
 from config.loader import resolve
 from config.resolved import Resolved
 from learning.assembly import RobotLearner
+from learning.evaluation import GoalTest, learnt_graph, run_test
+from learning.experts import ExpertSet
+from learning.metrics import Allowed, graph_errors, reachable_states
+from learning.offline import teach
 from learning.recorded import RecordedDecisions
 from learning.replaying import Replayed, replay_to_learning
 from learning.seeds import reset_seed
 from robot.bench import BenchReport, BenchResult, bench_report
 from robot.bus.topics import ARM_STATE
 from robot.messages import ArmMode, ArmState, GripState
+from robot.oracle import rules_oracle
 from robot.recording.messages import Purpose
 from robot.recording.recorder import Recorder
 from robot.recording.recording import Recording
 from robot.recording.session_file import SessionFile
 from robot.recording.sink import Sink
 from robot.recording.topics import LANES
+from robot.rigs import load
 
 __all__ = ["bench_session"]
 
 N_MESSAGES, N_TURNS = 40_000, 5
 N_EPOCHS, N_EPOCHS_FULL = 8, 60
+SHOWS = "sim_twin.demonstrator:record_demonstrations"
+N_SHOWN, N_TESTS, LEAST = 20, 20, 0.9
+EXPERTS_GOAL = 3
 REPLAY_GOAL = 200.0
 TICK_NS = 2_000_000
 
 
 def bench_session(*, full: bool) -> BenchReport:
-    """Measure; full records and replays a longer run."""
+    """Measure; full records and replays a longer run, and teaches a learner by scripted demonstrations alone."""
     started_s = perf_counter()
     with TemporaryDirectory() as folder:
         rows = _files(Path(folder)) + _run(Path(folder) / "run.mcap", N_EPOCHS_FULL if full else N_EPOCHS)
+        rows += _shown(Path(folder) / "shown.mcap") if full else []
     return bench_report("session", rows, seconds=perf_counter() - started_s)
 
 
@@ -148,6 +158,39 @@ def _run(path: Path, n_epochs: int) -> list[BenchResult]:
         ),
         *_replay_rows(replayed),
     ]  # fmt: skip
+
+
+def _shown(path: Path) -> list[BenchResult]:
+    """Show every goal 20 times by a scripted person, teach a learner by that alone, and test it."""
+    resolved = resolve(rig="twin", scenario="paper", learning="default")
+    names = [goal.name for goal in resolved.scenario.goals]
+    n_right = load(SHOWS)(path, resolved, n_each=N_SHOWN, seed=1)
+    learner = RobotLearner(resolved, seed=0)
+    agent, oracle = learner.agent, rules_oracle(resolved)
+    experts = agent.experts
+    assert isinstance(experts, ExpertSet), "build_agent makes one"
+    taught = teach(agent, experts, learner.station.spec, [path], scenario=resolved.scenario.name)
+    allowed: Allowed = lambda goal, state: oracle(goal, state, 0)  # noqa: E731
+    predicted = learnt_graph(agent)
+    assert predicted is not None, "the learner of this preset has a graph"
+    wrong = sum(graph_errors(predicted, allowed, reachable_states(allowed, len(names)), len(names)))
+    shares = [_tested(learner, goal) for goal in range(len(names))]
+    learner.close()
+    n_good = sum(share >= LEAST for share in shares)
+    return [
+        BenchResult(
+            name="shown_experts_at_90", value=float(n_good), unit="experts", goal=f">= {EXPERTS_GOAL}",
+            ok=n_good >= EXPERTS_GOAL,
+            details={name: f"{share:.0%}" for name, share in zip(names, shares, strict=True)}
+            | {"ways": " ".join(map(str, taught.ways_by_goal)), "went as they should": str(n_right)},
+        ),
+        BenchResult(name="shown_graph_wrong", value=float(wrong), unit="predictions", goal="0", ok=not wrong),
+    ]  # fmt: skip
+
+
+def _tested(learner: RobotLearner, goal: int) -> float:
+    test = GoalTest(root_seed=99, epoch=0, rules_epoch=0, goal=goal, n_tests=N_TESTS, n_trials=8)
+    return run_test(learner.agent, learner.station, test).n_successes / N_TESTS
 
 
 def _replay_rows(replayed: Replayed) -> list[BenchResult]:
