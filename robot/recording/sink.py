@@ -20,7 +20,7 @@ __all__ = ["FLUSHED_S", "MOST_WAITING", "Sink"]
 FLUSHED_S = 1.0
 """What is older than that is on the disk, not only on its way there: a power cut loses no more."""
 MOST_WAITING = 64
-"""Jobs, most of them chunks of up to a second."""
+"""Jobs, most of them chunks of up to half a second."""
 
 Job = Callable[[McapFile], object]
 

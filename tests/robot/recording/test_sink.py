@@ -14,7 +14,7 @@ from robot.recording.session_file import SessionFile
 from robot.recording.sink import Sink
 from robot.recording.topics import LANES, RECORDED
 
-STEP_NS = 500_000_000
+STEP_NS = 100_000_000
 
 
 def write(recorder, n, begin=0):
@@ -24,7 +24,7 @@ def write(recorder, n, begin=0):
 
 
 def test_a_full_disk_is_told_once_and_what_was_written_is_recovered(tmp_path, monkeypatch):
-    told, path, room = [], tmp_path / "s.mcap", 40_000
+    told, path, room = [], tmp_path / "s.mcap", 50_000
     real = os.write
 
     def until_full(fd, raw):
