@@ -7,7 +7,7 @@ is learnt in the end is compared with what the live learner had learnt, by finge
 from collections.abc import Callable, Iterator
 from hashlib import sha256
 from pathlib import Path
-from time import perf_counter
+from time import perf_counter, process_time
 
 import msgspec
 import torch
@@ -54,6 +54,8 @@ class Replayed(msgspec.Struct, frozen=True, kw_only=True):
     recorded_s: float
     """Time steps of the epochs that were replayed, as the arm took them."""
     seconds: float
+    processor_s: float
+    """Of the processor: a machine that does other things besides stretches the wall's."""
 
     @property
     def is_same(self) -> bool:
@@ -190,14 +192,14 @@ def replay_to_learning(path: Path, *, tell: Callable[[int], object] = lambda _: 
     with SessionFile(path) as session:
         agent, spec, n_done = _learner_of(session)
         station = ReplayedStation(session, spec)
-        begun_s = perf_counter()
+        begun_s, begun_processor_s = perf_counter(), process_time()
         done = _live_through(agent, station, n_done, tell)
-        seconds = perf_counter() - begun_s
+        seconds, processor_s = perf_counter() - begun_s, process_time() - begun_processor_s
     is_identical = done.n_compared > 0 and not done.diverged
     replayed = Replayed(
         n_epochs=done.n_done - n_done, n_steps=station.n_steps, n_compared=done.n_compared, is_identical=is_identical,
         diverged=done.diverged, n_done=done.n_done, sha256=fingerprint(agent.state_dict()),
-        recorded_s=station.recorded_s, seconds=seconds,
+        recorded_s=station.recorded_s, seconds=seconds, processor_s=processor_s,
     )  # fmt: skip
     return replayed, agent
 

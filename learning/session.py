@@ -8,6 +8,7 @@ from config.resolved import Resolved, dump_resolved
 from learning.assembly import RobotLearner, build_agent, learner_maker
 from learning.checkpoint import encode
 from learning.ended import Ended
+from learning.errors import RunFolderError
 from learning.evaluation_pool import EvaluationPool
 from learning.experiment import Experiment, Plan
 from learning.experts import ExpertSet
@@ -186,6 +187,8 @@ def open_session(
             config is not the one that the run began with.
     """
     if resume and folder.holds_run():
+        if taught_by:
+            raise RunFolderError(f"{folder.path} holds a run: expected no --from, a learner is taught before it begins")
         return _take_up(folder, wanted, stopwatch, consent, record)
     folder.refuse_unless_empty()
     resolved = resolve_wanted(wanted)

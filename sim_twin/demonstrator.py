@@ -6,6 +6,7 @@ from its seed. It drives as a stick does: a velocity for 20 ms, the hand opened 
 
 import math
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 
@@ -13,9 +14,12 @@ from config.resolved import Resolved
 from config.scenario import Goal, GoalKind
 from robot.messages import Grip, Percept, StepResult, Twist, Vec3
 from robot.oracle import rules_oracle
+from robot.recording.messages import Purpose
+from robot.recording.recording import Recording
+from robot.rigs import build_operator, build_station
 from robot.station import Station
 
-__all__ = ["Demonstrator"]
+__all__ = ["Demonstrator", "record_demonstrations"]
 
 STEP_S = 0.02
 FULL_M_S, EASE_PER_S = 0.22, 4.0
@@ -28,6 +32,24 @@ IDLE = 0.25
 """Share of ways before which nothing needed is pressed first: people show off."""
 MOST_STEPS = 600
 PUSH_M_S = 0.05
+FIRST_TABLE = 1000
+
+
+def record_demonstrations(path: Path, resolved: Resolved, *, n_each: int, seed: int) -> int:
+    """Record so many demonstrations of every goal, a table each, and return how many went as they should."""
+    recording = Recording(path, resolved, purpose=Purpose.DRIVE, seed=seed)
+    local = build_station(resolved, is_driven=True, tap=recording.ticks)
+    operator = build_operator(resolved.rig)
+    assert operator is not None, "a twin's rig names one"
+    try:
+        operator.arm_once(local)
+        person = Demonstrator(recording.drive(local), resolved, seed=seed)
+        n_goals = len(resolved.scenario.goals)
+        tables = [(k * n_goals + goal, goal) for k in range(n_each) for goal in range(n_goals)]
+        return sum(person.show(goal, seed=FIRST_TABLE + table, epoch=0) for table, goal in tables)
+    finally:
+        local.close()
+        recording.close()
 
 
 class Demonstrator:

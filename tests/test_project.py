@@ -19,10 +19,11 @@ ROOT = Path(__file__).parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
 ROOMS = ("config", "learning", "perception", "robot", "sim_twin")
 EDGES = {
-    "agent", "assembly", "assess", "bench", "checkpoint", "cli", "consent", "ended", "errors", "evaluation",
-    "evaluation_pool", "experiment", "explain", "figures", "goals", "metrics", "progress", "provenance", "report",
-    "robot_hours", "rows", "run_folder", "run_search", "seeds", "session", "stops", "stopwatch", "tables",
-    "telling", "time_spent", "wanted", "wired",
+    "agent", "assembly", "assess", "bench", "checkpoint", "cli", "consent", "demonstrations", "ended", "errors",
+    "evaluation", "evaluation_pool", "experiment", "explain", "figures", "fingerprint", "goals", "metrics",
+    "offline", "preceding", "progress", "provenance", "recorded", "recording", "replaying", "report",
+    "robot_hours", "rows", "run_folder", "run_search", "seeds", "session", "session_bench", "stops", "stopwatch",
+    "tables", "telling", "time_spent", "wanted", "wired",
 }  # fmt: skip
 """Modules of learning that hold nothing learnt: what runs the learner, judges it, keeps it or tells of it."""
 OWN_KEYS = {"config.learning", "config.values"}

@@ -28,6 +28,8 @@ OFTEN = 0.5
 NEEDED = (CONFIG, MODEL, VERSIONS)
 STEADY = (ARM_STATE.name, REQUESTED.name, SENT.name, VERDICT.name, PERCEPT.name)
 """Streams that should come at a rate while the arm is driven."""
+EXCUSES = (RESET_MARK.name, EVENT.name)
+"""What excuses a gap, or a percept that is the one before: a table that is laid out, a step that was cut short."""
 DRIFT = 1e-3
 MOST_PER_KIND = 20
 
@@ -104,10 +106,10 @@ def check(session: SessionFile) -> Checked:
         by_topic: dict[str, list[Raw]] = {}
         for raw in session.raw():
             by_topic.setdefault(session.topic_of(raw.channel), []).append(raw)
-        resets = [raw.log_ns for raw in by_topic.get(RESET_MARK.name, [])]
+        excused = [raw.log_ns for topic in EXCUSES for raw in by_topic.get(topic, [])]
         for topic, raws in sorted(by_topic.items()):
             streams.append(_stream(topic, raws))
-            _look_at_times(topic, raws, resets, found)
+            _look_at_times(topic, raws, excused, found)
         _look_at_epochs(session, found)
         _look_at_joints(session, found)
         _look_at_limiters(session, found)
@@ -143,7 +145,7 @@ def _stream(topic: str, raws: list[Raw]) -> Stream:
     return Stream(topic=topic, n=len(raws), first_s=raws[0].log_ns / 1e9, last_s=raws[-1].log_ns / 1e9, usual_s=usual)
 
 
-def _look_at_times(topic: str, raws: list[Raw], resets: list[int], found: _Findings) -> None:
+def _look_at_times(topic: str, raws: list[Raw], excused: list[int], found: _Findings) -> None:
     """Stamps that go back, come twice, drift or are missing; messages lost on their way into the file."""
     sequence: dict[int, int] = {}
     for raw in raws:
@@ -157,18 +159,21 @@ def _look_at_times(topic: str, raws: list[Raw], resets: list[int], found: _Findi
             detail = f"a stamp of {b.publish_ns / 1e9:.6f} s after one of {a.publish_ns / 1e9:.6f} s"
             found.add("stamps go back", topic, detail, at_ns=b.log_ns)
     if topic in STEADY:
-        _look_at_rate(topic, raws, resets, found)
+        _look_at_rate(topic, raws, excused, found)
 
 
-def _look_at_rate(topic: str, raws: list[Raw], resets: list[int], found: _Findings) -> None:
-    """Gaps, duplicates and drift of a stream that should be steady; laying the table out takes its own time."""
+def _look_at_rate(topic: str, raws: list[Raw], excused: list[int], found: _Findings) -> None:
+    """Gaps, duplicates and drift of a stream that should be steady; resets and stops take their own time, or none."""
     distances = sorted(b.publish_ns - a.publish_ns for a, b in itertools.pairwise(raws))
     usual = distances[len(distances) // 2] if distances else 0
     for a, b in itertools.pairwise(raws):
         far = b.publish_ns - a.publish_ns
+        is_excused = (far == 0 or far > GAP * usual) and any(a.log_ns <= at <= b.log_ns for at in excused)
+        if is_excused:
+            continue
         if far == 0 and a.payload == b.payload:
             found.add("duplicate", topic, f"the message of {a.publish_ns / 1e9:.6f} s came twice", at_ns=b.log_ns)
-        elif usual and far > GAP * usual and not any(a.log_ns <= at <= b.log_ns for at in resets):
+        elif usual and far > GAP * usual:
             found.add("gap", topic, f"{far / 1e9:.3f} s, usually {usual / 1e9:.3f} s", at_ns=a.log_ns)
     if len(raws) > FROZEN_N:
         first, last = raws[0], raws[-1]

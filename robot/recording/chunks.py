@@ -1,6 +1,7 @@
 """Messages that wait to be written, a chunk for each lane. Holds no clock: messages tell the time.
 
-A chunk is closed when it is a second old by its messages' own times, or large: the same messages make the same chunks.
+A chunk is closed when it is half a second old by its messages' own times, or large: the same messages make the same
+chunks.
 """
 
 from collections.abc import Callable
@@ -11,7 +12,8 @@ from robot.recording.records import HEAD_BYTES, MESSAGE_HEAD, Op
 
 __all__ = ["CHUNK_BYTES", "CHUNK_NS", "Chunks"]
 
-CHUNK_NS = 1_000_000_000
+CHUNK_NS = 500_000_000
+"""A recorder that is killed loses what is in its open chunks, and what its thread has yet to write: a second in all."""
 CHUNK_BYTES = 1 << 20
 _BODY_HEAD = MESSAGE_HEAD.size - HEAD_BYTES
 

@@ -83,6 +83,24 @@ def check(session: Session, *, json: Json = False) -> None:
 
 
 @app.command()
+def record(
+    out: Out,
+    *,
+    rig: Annotated[str, typer.Option(help="Shipped rig or a file: whose bus it is.")] = "virtual_lab",
+    scenario: Annotated[str, typer.Option(help="The table, for whoever reads it later.")] = "paper",
+    person: Annotated[str, typer.Option(help="Who attends, as they want to be called in the file.")] = "unnamed",
+    seconds: Annotated[float, typer.Option(min=0.0, help="How long; 0 until Ctrl-C.")] = 0.0,
+) -> None:
+    """Listen to the bus of a rig that runs, and record all that its processes write. Exit code 1 if nothing came."""
+    from robot.recording.watching_bus import record_bus  # brings Zenoh
+
+    listened = record_bus(out, rig=rig, scenario=scenario, person=person, seconds=seconds, tell=_tell)
+    typer.echo(f"{out}: {listened.n} messages, {listened.lost()} lost on the way, {listened.refused()} of another type")
+    if not listened.n:
+        raise typer.Exit(EXIT_FAILED)
+
+
+@app.command()
 def recover(session: Session, out: Out, *, json: Json = False) -> None:
     """Save what is whole in a torn or changed file, or in several that lie in one, into a new file."""
     saved = recover_session(session, out)
@@ -131,6 +149,23 @@ def merge(
 
 
 @app.command()
+def view(
+    session: Session,
+    out: Annotated[
+        Path | None, typer.Option("--out", "-o", help="Picture to write: png, svg or pdf.  [default: beside it]")
+    ] = None,
+    *,
+    begin: Annotated[float, typer.Option("--from", min=0.0, help="Seconds of the session's time.")] = 0.0,
+    end: Annotated[float | None, typer.Option("--to", help="Seconds; up to its end if left out.")] = None,
+) -> None:
+    """Draw joints and commands, the tool, distances, verdicts and decisions over the session's time."""
+    from robot.recording.view import save_view  # brings matplotlib
+
+    with SessionFile(session) as opened:
+        typer.echo(save_view(opened, out or session.with_suffix(".png"), from_s=begin, to_s=end))
+
+
+@app.command()
 def replay(
     session: Session,
     *,
@@ -155,6 +190,10 @@ def replay(
             typer.echo(line)
     if not done.is_same:
         raise typer.Exit(EXIT_FAILED)
+
+
+def _tell(line: str) -> None:
+    typer.echo(line, err=True)
 
 
 def _epochs(text: str) -> tuple[int, int]:

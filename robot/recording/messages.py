@@ -24,6 +24,8 @@ class Purpose(StrEnum):
     """Learning off."""
     DRIVE = "drive"
     """A person drives, or a script."""
+    WATCH = "watch"
+    """Whatever goes over the bus of a rig that runs is listened to."""
 
 
 class StationMark(msgspec.Struct, frozen=True, kw_only=True):

@@ -20,7 +20,7 @@ __all__ = ["FLUSHED_S", "MOST_WAITING", "Sink"]
 FLUSHED_S = 1.0
 """What is older than that is on the disk, not only on its way there: a power cut loses no more."""
 MOST_WAITING = 64
-"""Jobs, most of them chunks of up to a second."""
+"""Jobs, most of them chunks of up to half a second."""
 
 Job = Callable[[McapFile], object]
 
@@ -36,11 +36,11 @@ class Sink:
 
     def __init__(self, path: Path, *, may_wait: bool, now_s: Callable[[], float] = monotonic) -> None:
         self.path, self._may_wait, self._now_s = path, may_wait, now_s
+        if path.exists():
+            raise UnfitError(f"{path}: expected no file there yet; nothing is overwritten, name another")
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
             self._fd = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o644)
-        except FileExistsError as error:
-            raise UnfitError(f"{path}: expected no file there yet; nothing is overwritten, name another") from error
         except OSError as error:
             raise UnfitError(
                 f"{path}: expected a place to record to, {(error.strerror or str(error)).lower()}"

@@ -112,7 +112,9 @@ def test_fuzzed_files_are_saved_or_refused_in_words(whole, tmp_path):
 
 
 @pytest.mark.slow
-def test_ten_thousand_fuzzed_files_are_saved_or_refused_in_words(whole, tmp_path):
+@pytest.mark.timeout(3600)
+def test_ten_thousand_fuzzed_files_are_saved_or_refused_in_words(whole, tmp_path, monkeypatch):
+    monkeypatch.setattr(os, "fdatasync", lambda _fd: None)  # which takes most of the time, and no part in this
     assert fuzz(whole, tmp_path, 10_000, seed=2) > 5_000
 
 
@@ -141,13 +143,12 @@ def kill_one(folder, after_s):
     """Kill a recorder at an instant and return how much of what it was handed is lost, seconds."""
     path = folder / f"killed-{after_s:.4f}.mcap"
     command = [sys.executable, "-c", RECORDER, str(path)]
-    process = subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, text=True)
-    assert process.stdout is not None
-    process.stdout.readline()
-    time.sleep(after_s)
-    os.kill(process.pid, signal.SIGKILL)
-    told = process.stdout.read().split()
-    process.wait()
+    with subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        process.stdout.readline()
+        time.sleep(after_s)
+        os.kill(process.pid, signal.SIGKILL)
+        told = process.stdout.read().split()
     newest_ns = int(told[-1]) if told else 0
     out = path.with_suffix(".saved.mcap")
     try:
@@ -163,4 +164,5 @@ def kill_one(folder, after_s):
 def test_a_recorder_that_is_killed_at_any_instant_loses_a_second_at_most(tmp_path):
     rng = np.random.default_rng(4)
     lost_s = [kill_one(tmp_path, float(after_s)) for after_s in rng.uniform(0.2, 3.0, 100)]
+    print("lost at most", max(lost_s), "s, middle", sorted(lost_s)[50], "s")  # noqa: T201 - shown by -rP
     assert max(lost_s) <= 1.0, lost_s

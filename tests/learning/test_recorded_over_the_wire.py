@@ -1,0 +1,34 @@
+"""A run on the rig virtual_lab, in wall time, is recorded and lived through again to the same learner."""
+
+import json
+
+import pytest
+
+from learning.run_folder import RunFolder
+from robot.bus.topics import ARM_STATE, SENT
+from robot.recording.session_file import SessionFile
+from tests.support.small_lab import autotelic, controller_of, make_lab
+
+pytestmark = [pytest.mark.realtime, pytest.mark.slow]
+
+HOST = "127.0.0.66"
+
+
+def test_a_run_over_the_wire_is_recorded_and_replayed_to_the_same_learner(tmp_path):
+    make_lab(tmp_path, HOST)
+    with controller_of(tmp_path, HOST):
+        asked = ("learn", "--rig", "rig.yaml", "--scenario", "small.yaml", "--preset", "fast.yaml", "--out", "run")
+        code, _, said = autotelic(tmp_path, *asked, "--record", timeout_s=240)
+        assert code == 0, said
+    (path,) = (tmp_path / "run").glob("*.mcap")
+    with SessionFile(path) as session:
+        about = session.about
+        n_states = sum(1 for _ in session.messages(ARM_STATE))
+        n_sent = sum(1 for _ in session.messages(SENT))
+    assert (about["clock"], about["plant"]) == ("host", "virtual")
+    assert n_states > n_sent > 10
+    code, told, said = autotelic(tmp_path, "learn", "--replay", path, "--json", timeout_s=240)
+    assert code == 0, told + said
+    assert json.loads(told)["n_done"] == RunFolder(tmp_path / "run").checkpoints.newest()[0]["n_done"]
+    code, _, said = autotelic(tmp_path, "session", "replay", path, "--to", "twin")
+    assert (code, "on a wire; nothing moves" in said) == (2, True), said
