@@ -29,6 +29,9 @@ class CameraPerception:
     """P(t) from the newest picture that has arrived, the pictures before it, and the arm's own measurements.
 
     Implements robot.station_doors.Perceives and Sighted. What a simulated world gives away is not looked at.
+
+    Attributes:
+        eye: The camera as it was calibrated.
     """
 
     def __init__(self, *, scenario: Scenario, arm: ArmConfig, rig: Rig) -> None:
@@ -46,7 +49,7 @@ class CameraPerception:
                 f"rig {rig.name}: expected the calibration of camera {rig.camera.name}, came that of {file.name}"
             )
         self._arm, self._scenario, self._file = arm, scenario, file
-        self._eye = Eye(file)
+        self.eye = Eye(file)
         self._detector = Detector(camera=file, scenario=scenario, colours=load_colours(rig.camera.colours))
         self._tracks, self._course = TableTracks(scenario), ArmCourse()
         self._names = tuple(t.name for t in (*scenario.buttons, *scenario.boxes, *scenario.cylinders))
@@ -112,7 +115,7 @@ class CameraPerception:
     def _look(self, frame: Frame) -> None:
         """Take in a picture, the arm where it was when that was exposed."""
         posture = self._course.at(frame.stamp_ns)
-        outlines = [] if posture is None else arm_outlines(self._arm, *posture, self._eye)
+        outlines = [] if posture is None else arm_outlines(self._arm, *posture, self.eye)
         seen = self._detector.look(frame, outlines, self._tracks.near(frame.sequence))
         self._tracks.note_picture(seen)
         if seen.is_lit:

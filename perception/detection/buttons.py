@@ -2,6 +2,7 @@
 
 import msgspec
 import numpy as np
+from numpy.typing import NDArray
 
 from config.scenario import Button
 from perception.calibration.lens import Array
@@ -12,6 +13,7 @@ from perception.detection.hiding import Hiders
 from perception.detection.seen import Stance, ThingSeen
 from perception.detection.shapes import CIRCLE, cap_points, hull, stamp
 from perception.detection.silhouette import Fit, Hidden, fit_silhouette
+from perception.opencv import opencv
 
 __all__ = ["ButtonFinder", "ButtonFound"]
 
@@ -21,6 +23,8 @@ DOME_SHARE = 0.75
 """Of the cap's radius: what is read of the dome."""
 RING_SHARE, BASE_SHARE = 1.7, 1.2
 """Of the cap's radius: as far as the table is read around it, and within which is its base."""
+EDGE_PX = 3
+"""A cap that is within its region keeps so far from the window's edge."""
 LEAST_READ = 0.12
 """Share of dome and of ring that must be free."""
 
@@ -43,14 +47,14 @@ class ButtonFinder:
         x, y = button.spread_m
         spread = np.array([[i * x, j * y, 0.0] for i in (-1, 1) for j in (-1, 1)])
         around = np.concatenate([eye.pixels(self._middle + s + self._body) for s in spread])
-        self._low, self._high = np.floor(around.min(axis=0)), np.ceil(around.max(axis=0))
+        self._low, self._high = np.floor(around.min(axis=0)) - EDGE_PX, np.ceil(around.max(axis=0)) + EDGE_PX
 
     def find(self, seen: Glance, hiders: Hiders) -> ButtonFound:
         """Return where the button is and how its dome looks."""
         low = np.maximum(self._low - seen.origin, 0).astype(int)
         high = np.maximum(self._high - seen.origin, 0).astype(int)
         window = seen.labels[low[1] : high[1], low[0] : high[0]]
-        mask = mask_of(window, self._bit)
+        mask = _own(mask_of(window, self._bit))
         rows, columns = np.nonzero(mask)
         if len(rows) == 0:
             return ButtonFound(thing=self._unseen(0.0), reading=None)
@@ -112,3 +116,18 @@ class ButtonFinder:
             name=self._button.name, position_m=None, stance=Stance.UNKNOWN, axis_rad=None, confidence=0.0,
             visible=visible,
         )  # fmt: skip
+
+
+def _own(mask: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """Return a mask without what reaches into the window from beside it, unless that is the largest part.
+
+    A lit lid's edge of nearly the cap's colour, half a window away, made a cap unknown that was whole.
+    """
+    n, labels, stats, _ = opencv().connectedComponentsWithStats(mask, connectivity=4)
+    if n <= 2:
+        return mask
+    left, upper, width, height, area = stats[1:].T
+    is_out = (left == 0) | (upper == 0) | (left + width == mask.shape[1]) | (upper + height == mask.shape[0])
+    is_out[int(area.argmax())] = False
+    kept = np.concatenate([[False], ~is_out])
+    return kept[labels].astype(np.uint8)
