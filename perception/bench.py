@@ -1,6 +1,7 @@
 """`autotelic bench perception`: what is seen on pictures whose truth is known, by how bad the pictures are."""
 
 from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
 from time import perf_counter, thread_time
 
 from config.loader import resolve
@@ -11,6 +12,7 @@ from perception.calibration.camera_file import CameraFile
 from perception.detection import ColourFile, Detections, Detector
 from perception.detection.arm_outline import arm_outlines
 from perception.detection.eye import Eye
+from perception.labelled import LabelledFolder
 from perception.preparing import STUDIO, learnt
 from perception.scoring import Score, f1_of, percentile, score, total, upper_bound
 from robot.bench import BenchReport, BenchResult, bench_report
@@ -21,7 +23,8 @@ from robot.rigs import load
 
 __all__ = ["FIRST_SEED", "bench_perception", "level_results", "overall_results"]
 
-LEVELS = ("clean", "mild", "medium", "strong")
+CLEAN = "clean"
+LEVELS = (CLEAN, "mild", "medium", "strong")
 FIRST_SEED = 1_000_000
 """Pictures of seeds from 800,000 to 899,999 were looked at while thresholds were chosen, 900,001 is the guided
 sample's and 910,001 the boards'."""
@@ -31,24 +34,38 @@ DATE = "2026-01-01"
 MEAN_GOAL_MM, P95_GOAL_MM, DISTANCE_GOAL_MM, F1_GOAL, FALSE_GOAL, FRAME_GOAL_MS = 2.0, 4.0, 3.0, 0.999, 0.001, 10.0
 
 
-def bench_perception(*, full: bool) -> BenchReport:
-    """Calibrate by rendered boards, learn colours from a guided sample, then look at seeded pictures of each level."""
+def bench_perception(*, full: bool, frames: Path | None = None) -> BenchReport:
+    """Calibrate by rendered boards, learn colours from a guided sample, then look at seeded pictures of each level.
+
+    Args:
+        full: takes 500 pictures a level.
+        frames: a folder of measured photographs to look at instead, with the camera's files (docs/perception.md).
+    """
     begun = perf_counter()
     resolved = resolve()
+    looker, scores = _photographed(resolved, frames) if frames is not None else _rendered(resolved, full=full)
+    results = [*overall_results(scores), *_time_results(looker.first_ms, looker.next_ms)]
+    for level, came in scores.items():
+        results += level_results(level, came)
+    return bench_report("perception", results, seconds=perf_counter() - begun)
+
+
+def _rendered(resolved: Resolved, *, full: bool) -> "tuple[_Looker, dict[str, Score]]":
     studio: Photographer = load(STUDIO)(resolved, sharpness=SHARPNESS)
     try:
         board = Board()
         camera = calibrated(board, studio.boards(printed(board)), resolved.scenario, date=DATE)
         looker = _Looker(resolved, camera, learnt(studio, camera, resolved))
-        n = N_FULL if full else N_SHORT
-        seeds = range(FIRST_SEED, FIRST_SEED + n)
-        scores = {level: total(looker.scores(studio.photographs(seeds, level))) for level in LEVELS}
+        seeds = range(FIRST_SEED, FIRST_SEED + (N_FULL if full else N_SHORT))
+        return looker, {level: total(looker.scores(studio.photographs(seeds, level))) for level in LEVELS}
     finally:
         studio.close()
-    results = [*overall_results(scores), *_time_results(looker.first_ms, looker.next_ms)]
-    for level, came in scores.items():
-        results += level_results(level, came)
-    return bench_report("perception", results, seconds=perf_counter() - begun)
+
+
+def _photographed(resolved: Resolved, folder: Path) -> "tuple[_Looker, dict[str, Score]]":
+    taken = LabelledFolder(folder, resolved.scenario)
+    looker = _Looker(resolved, taken.camera, taken.colours)
+    return looker, {level: total(looker.scores(taken.photographs(level))) for level in taken.levels}
 
 
 class _Looker:
@@ -85,7 +102,8 @@ class _Looker:
 def overall_results(scores: dict[str, Score]) -> list[BenchResult]:
     """Return the rows over all levels, with what is asked of each."""
     whole = total(scores.values())
-    clean, perturbed = scores["clean"], total(s for level, s in scores.items() if level != "clean")
+    clean = scores.get(CLEAN, Score())
+    perturbed = total(s for level, s in scores.items() if level != CLEAN)
     n_wrong, n_told = clean.lamps[1] + clean.lamps[2], sum(clean.lamps[:4])
     bound = {"n": str(n_told), "rate_below": f"{upper_bound(n_wrong, n_told):.4f} at 95 %"}
     f1, false = f1_of(perturbed.lamps), whole.n_false / max(whole.n_things, 1)
