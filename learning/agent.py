@@ -10,7 +10,7 @@ from typing import Any, Protocol
 import msgspec
 
 from config.learning import Experiment
-from learning.interfaces import Attempt, Experts, GoalState, Kept, SubgoalSelector, TrialOutcome
+from learning.interfaces import Attempt, Experts, GoalState, Kept, Late, SubgoalSelector, TrialOutcome
 from learning.looking import ways_to_look
 from learning.stopwatch import Stopwatch
 from robot.messages import Heading, Percept
@@ -254,10 +254,11 @@ class Agent:
         is_fair = self.judge.is_hand_free(subgoal, scene.percept)
         self.experts.begin_trial(subgoal, scene.percept, explore=explore)
         outcome, n_steps = self._pursue(station, scene, subgoal)
+        late = None
         if outcome in (TrialOutcome.BLOCKED, TrialOutcome.NOT_REACHED):
-            outcome, is_known = self._look_again(station, scene, subgoal, outcome)
+            outcome, is_known, late = self._look_again(station, scene, subgoal, outcome)
             is_fair = is_fair and is_known
-        self.experts.end_trial(outcome, is_fair=is_fair)
+        self.experts.end_trial(outcome, is_fair=is_fair, late=late)
         self._stopwatch.lap("training")
         attempt = Attempt(
             epoch=epoch,
@@ -317,8 +318,8 @@ class Agent:
 
     def _look_again(
         self, station: Station, scene: _Scene, subgoal: int, outcome: TrialOutcome
-    ) -> tuple[TrialOutcome, bool]:
-        """Move away until it is seen what the trial came to; return that, and whether it was seen.
+    ) -> tuple[TrialOutcome, bool, Late | None]:
+        """Move away until it is seen what the trial came to; return that, whether it was seen, and what came about.
 
         Where the percept tells already, as ground truth always does, nothing is moved. A goal that cannot be seen even
         so was not achieved, as far as is known, and its trial was no fair try: it is no evidence against the skill, and
@@ -330,17 +331,17 @@ class Agent:
                 break
             result = station.step(way)
             if result.is_void:
-                return TrialOutcome.VOID, False
+                return TrialOutcome.VOID, False, None
             new = self._take_in(scene, result.percept)
             came_about = tuple(was or is_so for was, is_so in zip(came_about, new, strict=True))
         self._stopwatch.lap("stack")
         if scene.percept is end:
-            return outcome, True
-        self.experts.notice(end, came_about)
+            return outcome, True, None
+        late = Late(end, came_about)
         if came_about[subgoal]:
-            return TrialOutcome.ACHIEVED, True
+            return TrialOutcome.ACHIEVED, True, late
         is_known = self.judge.known(scene.percept, since_ns=end.stamp_ns)[subgoal]
-        return outcome if is_known else TrialOutcome.NOT_REACHED, is_known
+        return outcome if is_known else TrialOutcome.NOT_REACHED, is_known, late
 
     def _take_in(self, scene: _Scene, percept: Percept) -> GoalState:
         """Judge the goals, latch them and return those that came about in this very step.

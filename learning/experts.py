@@ -14,7 +14,7 @@ from config.learning import LearningConfig
 from learning.actions import Candidates, heading_of
 from learning.boredom import Boredom
 from learning.forward_model import make_forward_model
-from learning.interfaces import GoalState, TrialOutcome
+from learning.interfaces import GoalState, Late, TrialOutcome
 from learning.networks import normalised
 from learning.novelty import Curiosity, NoveltyMemory
 from learning.utility_model import UtilityModel
@@ -154,20 +154,12 @@ class ExpertSet:
             self._memory.add(self._trace[-1])
         self._note_achieved(result.percept, achieved)
 
-    def notice(self, percept: Percept, achieved: GoalState) -> None:
-        """Take in what turned out, on looking again, to have come about by the step that ended with a percept.
-
-        The trace ends there: what was moved since was moved to see, and led to nothing.
-        """
-        if self._is_learning and self._trace:
-            self._note_achieved(percept, achieved)
-
     def _note_achieved(self, percept: Percept, achieved: GoalState) -> None:
         for goal, is_achieved in enumerate(achieved):
             if is_achieved:
                 self._came_about.append((goal, np.array(self._trace), np.array(percept.distances_m)))
 
-    def end_trial(self, outcome: TrialOutcome, *, is_fair: bool = True) -> None:
+    def end_trial(self, outcome: TrialOutcome, *, is_fair: bool = True, late: Late | None = None) -> None:
         """Close the trial, learn what it showed and train.
 
         A blocked trial says nothing against the skill, not even where the arm got stuck, nor does a miss that was no
@@ -175,6 +167,9 @@ class ExpertSet:
         """
         if not self._is_learning or outcome is TrialOutcome.VOID:
             return
+        if late is not None and self._trace:
+            # The trace ends with the trial: what was moved since was moved to see, and led to nothing.
+            self._note_achieved(late.percept, late.achieved)
         model = self._models[self._subgoal]
         is_missed = outcome is TrialOutcome.NOT_REACHED
         for goal, trace, end_m in self._came_about:

@@ -1,13 +1,13 @@
 """Words and doors inside the learning room."""
 
 from enum import StrEnum
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import msgspec
 
 from robot.messages import Heading, Percept, StepResult
 
-__all__ = ["Attempt", "Experts", "GoalState", "Kept", "SubgoalSelector", "TrialOutcome"]
+__all__ = ["Attempt", "Experts", "GoalState", "Kept", "Late", "SubgoalSelector", "TrialOutcome"]
 
 GoalState = tuple[bool, ...]
 """Which goals were achieved during the current epoch (latched), by goal index."""
@@ -86,6 +86,14 @@ class SubgoalSelector(Kept, Protocol):
         ...
 
 
+class Late(NamedTuple):
+    """What turned out, on looking again after a trial, to have come about in it."""
+
+    percept: Percept
+    """That the trial's last step ended with."""
+    achieved: GoalState
+
+
 class Experts(Kept, Protocol):
     """All experts of a learner, one utility model a goal.
 
@@ -109,11 +117,7 @@ class Experts(Kept, Protocol):
         """Take in what the step came to; achieved tells every goal that came about in this very step."""
         ...
 
-    def notice(self, percept: Percept, achieved: GoalState) -> None:
-        """Take in what turned out, on looking again, to have come about by the step that ended with a percept."""
-        ...
-
-    def end_trial(self, outcome: TrialOutcome, *, is_fair: bool = True) -> None:
+    def end_trial(self, outcome: TrialOutcome, *, is_fair: bool = True, late: Late | None = None) -> None:
         """Close the trial and, when learning, train. A miss that was no fair try says nothing against the skill."""
         ...
 

@@ -8,12 +8,13 @@ import typer
 
 from config.loader import resolve
 from perception.calibration.camera_file import load_camera, save
-from perception.cameras.folder import picture_paths, read_picture
+from perception.cameras.folder import picture_paths, read_picture, write_picture
 from perception.detection import learn_colours
 from perception.detection.colour_file import save_colours
 from perception.detection.regions import load_regions
 from perception.errors import PerceptionConfigError
 from perception.preparing import prepared
+from perception.showing import shown_tables
 from robot.frames import frame_of
 
 __all__ = ["app"]
@@ -43,6 +44,30 @@ def prepare(
         f"wrote {calibration} ({file.intrinsics.rms_px:.2f} px rms, {placed.expected_mm:.2f} mm expected on the table) "
         f"and {colours} ({len(learnt.models)} colours, {len(learnt.lamps)} lamps)"
     )
+
+
+@app.command()
+def show(
+    out: Annotated[Path, typer.Argument(help="Folder to write pictures to.")],
+    *,
+    rig: Annotated[str, typer.Option(help="Shipped rig with a camera, or a file.")] = "twin_camera",
+    scenario: ScenarioOption = "paper",
+    seed: Annotated[int, typer.Option(min=0, help="Of the tables.")] = 0,
+    tables: Annotated[int, typer.Option(min=1, help="How many tables are laid out.")] = 4,
+    pictures: Annotated[
+        int, typer.Option(min=1, help="How many pictures are looked at of each; the last is drawn.")
+    ] = 4,
+) -> None:
+    """Draw what is made of pictures into them: outlines, distances, ages and, on a twin, how far off each thing is."""
+    out.mkdir(parents=True, exist_ok=True)
+    resolved = resolve(rig=rig, scenario=scenario)
+    for number, (picture, percept) in enumerate(
+        shown_tables(resolved, seed=seed, n_tables=tables, n_pictures=pictures)
+    ):
+        path = out / f"table-{number:03}.png"
+        write_picture(path, picture)
+        n_known = sum(thing.is_valid for thing in percept.objects)
+        typer.echo(f"{path}: {n_known} of {len(percept.objects)} things known")
 
 
 @app.command()

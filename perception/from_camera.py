@@ -12,6 +12,7 @@ from perception.detection.arm_outline import arm_outlines
 from perception.detection.eye import Eye
 from perception.errors import CameraSilentError, PerceptionConfigError
 from perception.tracking import ArmCourse, TableTracks, Tracked
+from perception.tracking.frames import FrameWatch
 from robot.frames import Frame
 from robot.hal.protocols import Camera
 from robot.messages import ArmState, ObjectPercept, Percept, SceneState
@@ -29,6 +30,9 @@ class CameraPerception:
     """P(t) from the newest picture that has arrived, the pictures before it, and the arm's own measurements.
 
     Implements robot.station_doors.Perceives and Sighted. What a simulated world gives away is not looked at.
+
+    Attributes:
+        eye: The camera as it was calibrated.
     """
 
     def __init__(self, *, scenario: Scenario, arm: ArmConfig, rig: Rig) -> None:
@@ -46,12 +50,14 @@ class CameraPerception:
                 f"rig {rig.name}: expected the calibration of camera {rig.camera.name}, came that of {file.name}"
             )
         self._arm, self._scenario, self._file = arm, scenario, file
-        self._eye = Eye(file)
+        self.eye = Eye(file)
         self._detector = Detector(camera=file, scenario=scenario, colours=load_colours(rig.camera.colours))
         self._tracks, self._course = TableTracks(scenario), ArmCourse()
         self._names = tuple(t.name for t in (*scenario.buttons, *scenario.boxes, *scenario.cylinders))
         self._camera: Camera | None = None
+        self._frames = FrameWatch()
         self._began_ns: int | None = None
+        self._newest_ns: int | None = None
         self._lit_ns: int | None = None
         """When the newest picture that shows the table was exposed."""
 
@@ -79,7 +85,7 @@ class CameraPerception:
     def forget(self) -> None:
         """Begin anew: the table was laid out by somebody."""
         self._course.forget()
-        self._began_ns = None
+        self._began_ns, self._newest_ns, self._frames = None, None, FrameWatch()
 
     def close(self) -> None:
         """Release the camera. Idempotent."""
@@ -105,18 +111,28 @@ class CameraPerception:
         if silence_ns > SILENT_NS:
             raise CameraSilentError(
                 f"camera {self._file.name}: expected a picture every {FRESH_NS / 1e6:.0f} ms, the last one that shows "
-                f"the table is {silence_ns / 1e6:.0f} ms old: is it plugged in, and does it see the table?"
+                f"the table is {silence_ns / 1e6:.0f} ms old: {self._what_is_wrong(arm.stamp_ns)}"
             )
         return self._percept(arm, is_fresh=silence_ns <= FRESH_NS)
 
     def _look(self, frame: Frame) -> None:
         """Take in a picture, the arm where it was when that was exposed."""
         posture = self._course.at(frame.stamp_ns)
-        outlines = [] if posture is None else arm_outlines(self._arm, *posture, self._eye)
+        outlines = [] if posture is None else arm_outlines(self._arm, *posture, self.eye)
         seen = self._detector.look(frame, outlines, self._tracks.near(frame.sequence))
         self._tracks.note_picture(seen)
-        if seen.is_lit:
+        self._frames.note(frame)
+        self._newest_ns = frame.stamp_ns
+        if seen.is_lit and not self._frames.is_frozen:
             self._lit_ns = frame.stamp_ns
+
+    def _what_is_wrong(self, now_ns: int) -> str:
+        """Return in words why no picture shows the table."""
+        if self._newest_ns is None or now_ns - self._newest_ns > SILENT_NS:
+            return "none came since; is it plugged in?"
+        if self._frames.is_frozen:
+            return "pictures come, and all are the same: it hangs; plug it in anew"
+        return "pictures come, and show no lit table: is it covered, dark or over-exposed?"
 
     def _percept(self, arm: ArmState, *, is_fresh: bool) -> Percept:
         by_name = {name: self._tracks.thing(name, arm) for name in self._names}

@@ -57,7 +57,10 @@ class BenchReport(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Bench(Protocol):
-    """A registered bench. One that reads a run folder takes a further keyword `run`, one of any length `seconds`."""
+    """A registered bench.
+
+    Further keywords: `run` of one that reads a run folder, `seconds` of any length, `frames` of photographs.
+    """
 
     def __call__(self, *, full: bool) -> BenchReport:
         """Measure; full takes the numbers an issue asks for, else at most 50 s."""
@@ -81,6 +84,9 @@ def bench(
         float | None,
         typer.Option("--seconds", min=1.0, help="How long, for a bench that takes any length."),
     ] = None,
+    frames: Annotated[
+        Path | None, typer.Option("--frames", help="Folder of measured photographs, for a bench that looks at them.")
+    ] = None,
 ) -> None:
     """Measure and print figures; exit code 1 if one of them misses its goal."""
     known = {point.name: point for point in entry_points(group=BENCH_GROUP)}
@@ -89,7 +95,7 @@ def bench(
         return
     if name not in known:
         raise typer.BadParameter(f"expected one of {', '.join(sorted(known))}, got {name}", param_hint="NAME")
-    report = _measure(known[name], full=full, run=run, seconds=seconds)
+    report = _measure(known[name], full=full, run=run, seconds=seconds, frames=frames)
     if json:
         typer.echo(msgspec.json.encode(report).decode())
     else:
@@ -98,15 +104,19 @@ def bench(
         raise typer.Exit(1)
 
 
-def _measure(point: EntryPoint, *, full: bool, run: Path | None, seconds: float | None) -> BenchReport:
-    """Load and call a bench, handing it the run folder and the length if it takes them."""
+def _measure(
+    point: EntryPoint, *, full: bool, run: Path | None, seconds: float | None, frames: Path | None
+) -> BenchReport:
+    """Load and call a bench, handing it the run folder, the length and the photographs if it takes them."""
     function = point.load()
     known = inspect.signature(function).parameters
     if run is not None and "run" not in known:
         raise typer.BadParameter(f"bench {point.name} reads no run folder", param_hint="RUN")
     if seconds is not None and "seconds" not in known:
         raise typer.BadParameter(f"bench {point.name} has a length of its own", param_hint="--seconds")
-    offered = {"run": run, "seconds": seconds}
+    if frames is not None and "frames" not in known:
+        raise typer.BadParameter(f"bench {point.name} looks at no photographs", param_hint="--frames")
+    offered = {"run": run, "seconds": seconds, "frames": frames}
     with redirected_stdout(STDERR):
         return function(full=full, **{name: value for name, value in offered.items() if name in known})
 

@@ -16,7 +16,7 @@ import numpy as np
 from numba import types
 from numpy.typing import NDArray
 
-__all__ = ["Bits2", "Bytes2", "Bytes3", "Floats2", "Floats3", "Table", "compiled"]
+__all__ = ["Bits2", "Bytes2", "Bytes3", "Floats2", "Floats3", "Ints2", "Table", "compiled"]
 
 Table = NDArray[np.float64]
 """Rows of numbers, contiguous: (n, m)."""
@@ -26,6 +26,8 @@ Bytes3 = Annotated[NDArray[np.uint8], 3]
 """A picture, contiguous: (h, w, 3)."""
 Bits2 = Annotated[NDArray[np.uint32], 2]
 """A set of bits a pixel, contiguous: (h, w)."""
+Ints2 = Annotated[NDArray[np.int32], 2]
+"""A whole number for each pixel, or rows of them, contiguous: (h, w)."""
 Floats2 = Annotated[NDArray[np.float32], 2]
 """A picture of numbers that need no more digits, contiguous: (h, w)."""
 Floats3 = Annotated[NDArray[np.float64], 3]
@@ -36,6 +38,7 @@ Function = TypeVar("Function", bound=Callable[..., object])
 _ARRAYS = {
     Bytes2: types.uint8,
     Floats2: types.float32,
+    Ints2: types.int32,
     Bytes3: types.uint8,
     Bits2: types.uint32,
     Floats3: types.float64,

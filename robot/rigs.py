@@ -178,8 +178,8 @@ def check_learnable(rig: Rig) -> None:
 def _require_perception(rig: Rig) -> str:
     if rig.perception is None:
         raise RobotConfigError(
-            f"rig {rig.name}: expected a perception, it has none: percepts by camera are not there yet, and without "
-            "them nothing can be learnt on a real arm. Nothing was connected to, nothing moves"
+            f"rig {rig.name}: expected a perception, it has none: no driver of a real camera is there yet, and without "
+            "percepts nothing can be learnt on a real arm. Nothing was connected to, nothing moves"
         )
     return rig.perception
 

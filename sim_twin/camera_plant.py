@@ -9,12 +9,12 @@ from config.arm import ArmConfig
 from config.cell import CellConfig
 from config.rig import Rig
 from config.scenario import Scenario
-from robot.errors import WireError
+from robot.errors import RobotConfigError, WireError
 from robot.frames import CameraSpec, Frame
 from robot.hal.protocols import Arm, Camera, Resetter, SceneTruth
 from robot.messages import PlantIdentity
 from sim_twin.plant import TwinPlant, TwinWorld
-from sim_twin.render import light_lamps
+from sim_twin.render import HOW_TO_DRAW, NoGLError, light_lamps
 from sim_twin.rendered_camera import Optics, RenderedCamera
 from sim_twin.studio.viewing import RIG_VIEW, View
 
@@ -49,9 +49,12 @@ class WatchingCamera:
         """Make what draws.
 
         Raises:
-            NoGLError: nothing here can.
+            RobotConfigError: nothing here can; the message says what to do.
         """
-        self._rendered.connect()
+        try:
+            self._rendered.connect()
+        except NoGLError as error:
+            raise RobotConfigError(f"{error}. {HOW_TO_DRAW}") from error
         self._newest, self._is_open = None, True
 
     def restart(self, rng: np.random.Generator) -> None:

@@ -13,9 +13,13 @@ from numpy.typing import NDArray
 from sim_twin.names import on_table
 from sim_twin.plant import TwinWorld
 
-__all__ = ["NoGLError", "Picture", "Viewpoint", "light_lamps", "open_renderer", "render"]
+__all__ = ["HOW_TO_DRAW", "NoGLError", "Picture", "Viewpoint", "light_lamps", "open_renderer", "render"]
 
 Picture = NDArray[np.uint8]
+HOW_TO_DRAW = (
+    "Set MUJOCO_GL=egl (Debian: apt install libegl1 libgl1-mesa-dri) or MUJOCO_GL=osmesa (apt install libosmesa6) "
+    "before the program starts."
+)
 BACKENDS = ("egl", "osmesa")
 GLOW = 0.55
 LOOKED_AT_M = (0.30, 0.0, 0.22)
@@ -58,8 +62,7 @@ def open_renderer(world: TwinWorld, *, width: int = 1280, height: int = 960) -> 
     except (ImportError, AttributeError, RuntimeError, mujoco.FatalError) as error:
         backend = os.environ.get("MUJOCO_GL", "unset")
         raise NoGLError(
-            f"expected an off-screen GL, MUJOCO_GL is {backend}, it said: {error}. Set MUJOCO_GL=egl (Debian: apt "
-            "install libegl1 libgl1-mesa-dri) or MUJOCO_GL=osmesa (apt install libosmesa6) before the program starts."
+            f"expected an off-screen GL, MUJOCO_GL is {backend}, it said: {error}. {HOW_TO_DRAW}"
         ) from error
     try:
         yield renderer

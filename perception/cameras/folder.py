@@ -7,7 +7,7 @@ from perception.opencv import opencv
 from robot.errors import WireError
 from robot.frames import CameraSpec, Frame, Picture, frame_of
 
-__all__ = ["SUFFIXES", "FolderCamera", "picture_paths", "read_picture"]
+__all__ = ["SUFFIXES", "FolderCamera", "picture_paths", "read_picture", "write_picture"]
 
 SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff")
 NS = 1e9
@@ -38,6 +38,17 @@ def read_picture(path: Path) -> Picture:
     if picture is None:
         raise PerceptionConfigError(f"{path}: expected a picture, came what OpenCV cannot read")
     return cv2.cvtColor(picture, cv2.COLOR_BGR2RGB)
+
+
+def write_picture(path: Path, picture: Picture) -> None:
+    """Write a picture file.
+
+    Raises:
+        PerceptionConfigError: it cannot be written there.
+    """
+    cv2 = opencv()
+    if not cv2.imwrite(str(path), cv2.cvtColor(picture, cv2.COLOR_RGB2BGR)):
+        raise PerceptionConfigError(f"{path}: expected a place to write a picture to")
 
 
 class FolderCamera:

@@ -2,6 +2,7 @@
 
 import msgspec
 import numpy as np
+from numpy.typing import NDArray
 
 from config.scenario import Button
 from perception.calibration.lens import Array
@@ -9,6 +10,7 @@ from perception.detection.colours import features
 from perception.detection.eye import Eye
 from perception.detection.glance import Glance, mask_of
 from perception.detection.hiding import Hiders
+from perception.detection.patches import LEFT, LOWER, N_PIXELS, RIGHT, UPPER, components, median_colour
 from perception.detection.seen import Stance, ThingSeen
 from perception.detection.shapes import CIRCLE, cap_points, hull, stamp
 from perception.detection.silhouette import Fit, Hidden, fit_silhouette
@@ -21,6 +23,9 @@ DOME_SHARE = 0.75
 """Of the cap's radius: what is read of the dome."""
 RING_SHARE, BASE_SHARE = 1.7, 1.2
 """Of the cap's radius: as far as the table is read around it, and within which is its base."""
+EDGE_PX = 3
+"""A cap that is within its region keeps so far from the window's edge."""
+RIM = np.column_stack([CIRCLE, np.zeros(len(CIRCLE))])
 LEAST_READ = 0.12
 """Share of dome and of ring that must be free."""
 
@@ -43,14 +48,14 @@ class ButtonFinder:
         x, y = button.spread_m
         spread = np.array([[i * x, j * y, 0.0] for i in (-1, 1) for j in (-1, 1)])
         around = np.concatenate([eye.pixels(self._middle + s + self._body) for s in spread])
-        self._low, self._high = np.floor(around.min(axis=0)), np.ceil(around.max(axis=0))
+        self._low, self._high = np.floor(around.min(axis=0)) - EDGE_PX, np.ceil(around.max(axis=0)) + EDGE_PX
 
     def find(self, seen: Glance, hiders: Hiders) -> ButtonFound:
         """Return where the button is and how its dome looks."""
         low = np.maximum(self._low - seen.origin, 0).astype(int)
         high = np.maximum(self._high - seen.origin, 0).astype(int)
         window = seen.labels[low[1] : high[1], low[0] : high[0]]
-        mask = mask_of(window, self._bit)
+        mask = _own(mask_of(window, self._bit))
         rows, columns = np.nonzero(mask)
         if len(rows) == 0:
             return ButtonFound(thing=self._unseen(0.0), reading=None)
@@ -81,7 +86,7 @@ class ButtonFinder:
 
     def _median(self, seen: Glance, hidden: Hidden, at: Array, radius_m: float, hole_m: float) -> Array | None:
         """Return the median colour of a disc that lies flat, less a disc about its middle.  -> (3,)"""
-        rim = np.column_stack([CIRCLE, np.zeros(len(CIRCLE))])
+        rim = RIM
         outer = hull(self._eye.pixels(at + radius_m * rim))
         low = np.floor(outer.min(axis=0))
         shape = tuple(int(n) for n in (np.ceil(outer.max(axis=0)) - low + 1)[::-1])
@@ -94,10 +99,10 @@ class ButtonFinder:
         n_whole = int(mask.sum())
         mask &= hidden.free(low, (shape[0], shape[1]))
         first = (low - seen.origin).astype(int)
-        part = seen.rgb[max(first[1], 0) : first[1] + shape[0], max(first[0], 0) : first[0] + shape[1]]
-        if part.shape[:2] != mask.shape or int(mask.sum()) < LEAST_READ * n_whole:
+        is_inside = (first >= 0).all() and (first + shape[::-1] <= seen.labels.shape[::-1]).all()
+        if not is_inside or int(mask.sum()) < LEAST_READ * n_whole:
             return None
-        return np.median(part[mask > 0], axis=0)
+        return np.array(median_colour(seen.rgb, mask, int(first[0]), int(first[1])))
 
     def _thing(self, fit: Fit) -> ThingSeen:
         x, y = fit.position_m
@@ -112,3 +117,19 @@ class ButtonFinder:
             name=self._button.name, position_m=None, stance=Stance.UNKNOWN, axis_rad=None, confidence=0.0,
             visible=visible,
         )  # fmt: skip
+
+
+def _own(mask: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """Return a mask without what reaches into the window from beside it, unless that is the largest part.
+
+    A lit lid's edge of nearly the cap's colour, half a window away, made a cap unknown that was whole.
+    """
+    labels, rows = components(mask)
+    if len(rows) <= 1:
+        return mask
+    height, width = mask.shape
+    is_out = (rows[:, LEFT] == 0) | (rows[:, UPPER] == 0)
+    is_out |= (rows[:, RIGHT] == width - 1) | (rows[:, LOWER] == height - 1)
+    is_out[int(rows[:, N_PIXELS].argmax())] = False
+    kept = np.concatenate([[False], ~is_out])
+    return kept[labels].astype(np.uint8)

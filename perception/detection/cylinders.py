@@ -1,5 +1,6 @@
 """Loose cylinders: every patch of the right colour is tried as one that stands and as one that lies."""
 
+import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
@@ -8,10 +9,10 @@ from perception.calibration.lens import Array
 from perception.detection.eye import Eye
 from perception.detection.glance import Glance, mask_of
 from perception.detection.hiding import Hiders
+from perception.detection.patches import N_PIXELS, components
 from perception.detection.seen import Stance, ThingSeen
 from perception.detection.shapes import hull, lying_points, standing_points
-from perception.detection.silhouette import Fit, fit_silhouette
-from perception.opencv import opencv
+from perception.detection.silhouette import Fit, fit_where_free
 from robot.messages import Vec3
 
 __all__ = ["CylinderFinder"]
@@ -20,6 +21,8 @@ LEAST_OVERLAP = 0.8
 LEAST_VISIBLE = 0.4
 SURE_OVERLAP = 0.92
 """A standing cylinder that fits so well is not tried lying."""
+LEAST_LIKE = 0.3
+"""What covers less of a standing one is no lying one either: that covers two thirds."""
 LEAST_LEAD = 0.04
 """By so much the better stance must fit better to be told."""
 LEAST_PATCH = 0.15
@@ -28,6 +31,17 @@ N_PATCHES = 3
 REACH = 1.2
 """What was seen somewhere is looked for this many of its diagonals about it."""
 N_AXES = 6
+
+
+class _Patch(msgspec.Struct, frozen=True, kw_only=True):
+    """One patch of a cylinder's colour, alone."""
+
+    mask: NDArray[np.uint8]
+    origin: Array
+    """Its first pixel in the picture."""
+    middle_px: tuple[float, float]
+    free: NDArray[np.uint8]
+    """1 where nothing known stands before a body that is there."""
 
 
 class CylinderFinder:
@@ -65,18 +79,17 @@ class CylinderFinder:
 
     def _patches(self, mask: NDArray[np.uint8], origin: Array) -> list[tuple[NDArray[np.uint8], Array]]:
         """Return the largest patches, each alone in a window of its own with the window's first pixel."""
-        _, labels, stats, _ = opencv().connectedComponentsWithStats(mask, connectivity=4)
-        order = np.argsort(-stats[1:, 4])[:N_PATCHES] + 1
+        labels, rows = components(mask)
         patches = []
-        for label in order.tolist():
-            left, upper, width, height, area = stats[label].tolist()
-            middle = origin + np.array([left + width / 2.0, upper + height / 2.0])
+        for k in np.argsort(-rows[:, N_PIXELS], kind="stable")[:N_PATCHES].tolist():
+            left, upper, right, lower, area = rows[k].tolist()
+            middle = origin + np.array([(left + right + 1) / 2.0, (upper + lower + 1) / 2.0])
             if area < LEAST_PATCH * self._area_px(middle):
                 continue
-            edge = max(width, height)
+            edge = max(right - left, lower - upper) + 1
             first = np.maximum([left - edge, upper - edge], 0)
-            part = labels[first[1] : upper + height + edge, first[0] : left + width + edge]
-            patches.append(((part == label).astype(np.uint8), origin + first))
+            part = labels[first[1] : lower + 1 + edge, first[0] : right + 1 + edge]
+            patches.append(((part == k + 1).astype(np.uint8), origin + first))
         return patches
 
     def _area_px(self, middle: Array) -> float:
@@ -86,11 +99,14 @@ class CylinderFinder:
         x, y = outline.T
         return float(abs(x @ np.roll(y, 1) - y @ np.roll(x, 1)) / 2.0)
 
-    def _try(self, patch: NDArray[np.uint8], origin: Array, hiders: Hiders) -> ThingSeen | None:
-        stands = self._fit(self._standing, patch, origin, hiders)
+    def _try(self, mask: NDArray[np.uint8], origin: Array, hiders: Hiders) -> ThingSeen | None:
+        patch = self._patch(mask, origin, hiders)
+        if patch is None:
+            return None
+        stands = self._fit(self._standing, patch)
         lies: tuple[Fit, float] | None = None
-        if stands is None or stands.overlap < SURE_OVERLAP:
-            lies = self._lying(patch, origin, hiders)
+        if stands is None or LEAST_LIKE <= stands.overlap < SURE_OVERLAP:
+            lies = self._lying(patch)
         best = stands if lies is None or (stands is not None and stands.overlap >= lies[0].overlap) else lies[0]
         if best is None or best.overlap < LEAST_OVERLAP or best.visible < LEAST_VISIBLE:
             return None
@@ -102,34 +118,42 @@ class CylinderFinder:
         assert lies is not None
         return self._thing(best, Stance.LYING, lies[1], self._cylinder.diameter_m / 2.0)
 
-    def _lying(self, patch: NDArray[np.uint8], origin: Array, hiders: Hiders) -> tuple[Fit, float] | None:
+    def _lying(self, patch: _Patch) -> tuple[Fit, float] | None:
         """Return the best fit over axes all round, then around the best of them, and its axis."""
         best: tuple[Fit, float] | None = None
         step = np.pi / N_AXES
         for axis in np.arange(N_AXES) * step:
-            best = self._better(best, float(axis), patch, origin, hiders)
+            best = self._better(best, float(axis), patch)
         for _ in range(3):
             step /= 2.0
             if best is not None:
                 for axis in (best[1] - step, best[1] + step):
-                    best = self._better(best, axis, patch, origin, hiders)
+                    best = self._better(best, axis, patch)
         return None if best is None else (best[0], best[1] % np.pi)
 
-    def _better(
-        self, best: tuple[Fit, float] | None, axis_rad: float, patch: NDArray[np.uint8], origin: Array, hiders: Hiders
-    ) -> tuple[Fit, float] | None:
-        fit = self._fit(lying_points(self._cylinder, axis_rad), patch, origin, hiders)
+    def _better(self, best: tuple[Fit, float] | None, axis_rad: float, patch: _Patch) -> tuple[Fit, float] | None:
+        fit = self._fit(lying_points(self._cylinder, axis_rad), patch)
         is_better = fit is not None and (best is None or fit.overlap > best[0].overlap)
         return (fit, axis_rad) if fit is not None and is_better else best
 
-    def _fit(self, body: Array, patch: NDArray[np.uint8], origin: Array, hiders: Hiders) -> Fit | None:
-        rows, columns = np.nonzero(patch)
+    def _patch(self, mask: NDArray[np.uint8], origin: Array, hiders: Hiders) -> _Patch | None:
+        """Return a patch with what stands before a body there; none where no ray of it meets the table."""
+        rows, columns = np.nonzero(mask)
         u, v = float(columns.mean() + origin[0]), float(rows.mean() + origin[1])
-        start = self._eye.spot(u, v, self._table_m + float(body[:, 2].max()) / 2.0)
+        foot = self._eye.spot(u, v, self._table_m + float(self._standing[:, 2].max()) / 2.0)
+        if not np.isfinite(foot).all():
+            return None
+        foot[2] = self._table_m
+        hidden = hiders.before(foot + self._standing)
+        free = hidden.free(origin, (mask.shape[0], mask.shape[1]))
+        return _Patch(mask=mask, origin=origin, middle_px=(u, v), free=free)
+
+    def _fit(self, body: Array, patch: _Patch) -> Fit | None:
+        start = self._eye.spot(*patch.middle_px, self._table_m + float(body[:, 2].max()) / 2.0)
         if not np.isfinite(start).all():
             return None
         start[2] = self._table_m
-        return fit_silhouette(self._eye, body, start, patch, origin, hiders.before(start + body))
+        return fit_where_free(self._eye, body, start, patch.mask, patch.origin, patch.free)
 
     def _thing(self, fit: Fit, stance: Stance, axis_rad: float | None, above_m: float) -> ThingSeen:
         x, y = fit.position_m

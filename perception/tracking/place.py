@@ -10,6 +10,10 @@ from robot.messages import Vec3
 __all__ = ["Place", "PlaceTrack", "Steadiness"]
 
 
+MUCH = 0.15
+"""Of a thing's outline."""
+
+
 class Steadiness(msgspec.Struct, frozen=True, kw_only=True):
     """How much one kind of thing keeps to its place."""
 
@@ -28,6 +32,8 @@ class Place(msgspec.Struct, frozen=True, kw_only=True):
     stance: Stance
     axis_rad: float | None
     confidence: float
+    visible: float
+    """Share of its outline that nothing stood before, where the place is from."""
     stamp_ns: int
     """Of the newest picture that agrees."""
 
@@ -61,16 +67,28 @@ class PlaceTrack:
             return
         found = Place(
             position_m=seen.position_m, stance=seen.stance, axis_rad=seen.axis_rad, confidence=seen.confidence,
-            stamp_ns=stamp_ns,
+            visible=seen.visible, stamp_ns=stamp_ns,
         )  # fmt: skip
         if self.place is None:
             self.put(found)
         elif self._agrees(self.place, found):
-            self._n += 1
-            self.place = _mixed(self.place, found, max(1.0 / self._n, self._steady.least_weight))
+            self._bear_out(self.place, found)
             self._other, self._n_other = None, 0
         else:
             self._doubt(found)
+
+    def _bear_out(self, place: Place, found: Place) -> None:
+        """Take in a picture that agrees: a much freer sight stands for itself, a much worse one says "still there".
+
+        What half a silhouette says is off to one side, in every picture alike: a mean does not mend that.
+        """
+        if found.visible > place.visible + MUCH:
+            self.put(found)
+        elif found.visible < place.visible - MUCH:
+            self.place = msgspec.structs.replace(place, stamp_ns=found.stamp_ns)
+        else:
+            self._n += 1
+            self.place = _mixed(place, found, max(1.0 / self._n, self._steady.least_weight))
 
     def _doubt(self, found: Place) -> None:
         """Take in a place that is not the one believed."""
@@ -93,4 +111,5 @@ def _mixed(place: Place, found: Place, weight: float) -> Place:
         position_m=(ax + weight * (bx - ax), ay + weight * (by - ay), az + weight * (bz - az)),
         stance=found.stance, axis_rad=found.axis_rad, stamp_ns=found.stamp_ns,
         confidence=place.confidence + weight * (found.confidence - place.confidence),
+        visible=max(place.visible, found.visible),
     )  # fmt: skip

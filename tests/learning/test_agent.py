@@ -123,7 +123,7 @@ class Told(Idle):
         super().__init__(rng)
         self.told = []
 
-    def end_trial(self, outcome, *, is_fair=True):
+    def end_trial(self, outcome, *, is_fair=True, late=None):
         self.told.append(is_fair)
 
 

@@ -40,14 +40,14 @@ def run(station, goal=0):
     learner = make_toy_learner(0, PROTOCOL)
     agent: Agent = learner.agent
     noticed = []
-    agent.experts.notice = lambda percept, achieved: noticed.append((percept, achieved))
+    agent.experts.end_trial = lambda outcome, *, is_fair, late: noticed.append((is_fair, late))
     return agent.test_epoch(station, epoch=0, seed=3, goal=goal), noticed
 
 
 def test_what_is_always_seen_is_not_looked_at_again():
     record, noticed = run(ToyStation())
     assert record.is_achieved
-    assert noticed == []
+    assert noticed == [(True, None)] * len(noticed)
 
 
 def test_a_lamp_under_the_hand_is_seen_on_looking_again_and_is_told_of_the_step_that_lit_it():
@@ -55,15 +55,17 @@ def test_a_lamp_under_the_hand_is_seen_on_looking_again_and_is_told_of_the_step_
     record, noticed = run(station)
     assert record.is_achieved
     assert record.trials[-1].attempt.outcome is TrialOutcome.ACHIEVED
-    percept, achieved = noticed[-1]
-    assert achieved[record.trials[-1].attempt.subgoal]
-    assert not any(percept.button_states), "what is learnt from is the percept of the place, not of the look"
+    is_fair, late = noticed[-1]
+    assert is_fair
+    assert late.achieved[record.trials[-1].attempt.subgoal]
+    assert not any(late.percept.button_states), "what is learnt from is the percept of the place, not of the look"
 
 
 def test_a_lamp_that_cannot_be_seen_from_anywhere_is_no_proof_of_a_block():
     station = HidingStation(clear_m=9.9)
-    record, _ = run(station)
+    record, noticed = run(station)
     assert not record.is_achieved
+    assert not any(is_fair for is_fair, _ in noticed), "and no evidence against the skill"
     assert {trial.attempt.outcome for trial in record.trials} == {TrialOutcome.NOT_REACHED}
 
 

@@ -15,6 +15,7 @@ from perception.detection import learn_colours
 from perception.detection.colour_file import save_colours
 from perception.errors import CameraSilentError, PerceptionConfigError
 from perception.from_camera import CameraPerception
+from perception.tracking.frames import FrameWatch
 from robot.frames import CameraSpec, frame_of
 from robot.messages import ObjectPose, SceneState
 from tests.support.painted_table import CAMERA, SCENARIO, guided_sample, nominal, painted
@@ -150,8 +151,29 @@ def test_a_black_or_overexposed_camera_is_as_good_as_silent(looking, level):
     camera.show(dead, 200)
     assert not any(o.is_valid for o in perception.perceive(at(240), None).objects)
     camera.show(dead, 620)
-    with pytest.raises(CameraSilentError, match="does it see the table"):
+    with pytest.raises(CameraSilentError, match="covered, dark or over-exposed"):
         perception.perceive(at(650), None)
+
+
+def test_a_frozen_camera_is_noticed_at_its_third_picture_and_told_from_an_unplugged_one(looking):
+    perception, camera = looking
+    for k in range(12):
+        camera.show(table(), 20 + 50 * k)
+        seen = perception.perceive(at(60 + 50 * k), None)
+        assert seen.objects[0].is_valid is (60 + 50 * k - 70 <= 150), "the second picture is the last to go by"
+    camera.show(table(), 650)
+    with pytest.raises(CameraSilentError, match="all are the same"):
+        perception.perceive(at(690), None)
+    perception.forget()
+    camera.show(table(), 700)
+    assert perception.perceive(at(740), None).objects[0].is_valid
+
+
+def test_frames_that_were_lost_are_counted():
+    watch = FrameWatch()
+    for sequence in (4, 5, 8, 9, 9):
+        watch.note(msgspec.structs.replace(table(), sequence=sequence))
+    assert watch.n_lost == 2
 
 
 def test_after_a_reset_nothing_of_the_table_before_is_known(looking):

@@ -13,7 +13,7 @@ import numpy as np
 
 from config.learning import Experiment
 from learning.agent import Agent
-from learning.interfaces import Attempt, GoalState, TrialOutcome
+from learning.interfaces import Attempt, GoalState, Late, TrialOutcome
 from learning.seeds import named_generator
 from robot.messages import (
     Executed,
@@ -263,10 +263,7 @@ class ToyExperts:
     def observe(self, result: StepResult, achieved: GoalState) -> None:
         pass
 
-    def notice(self, percept: Percept, achieved: GoalState) -> None:
-        pass
-
-    def end_trial(self, outcome: TrialOutcome, *, is_fair: bool = True) -> None:
+    def end_trial(self, outcome: TrialOutcome, *, is_fair: bool = True, late: Late | None = None) -> None:
         if not self._explore or outcome is TrialOutcome.VOID:
             return
         if outcome is not TrialOutcome.BLOCKED:

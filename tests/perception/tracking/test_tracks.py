@@ -20,10 +20,10 @@ MS = 1_000_000
 FULL, EMPTY = (GripState(opening_m=w, is_moving=False, has_object=o) for w, o in ((0.044, True), (0.085, False)))
 
 
-def at(x, y=0.0, z=0.03, *, stance=Stance.STANDING, name="red_cylinder", confidence=0.9):
+def at(x, y=0.0, z=0.03, *, stance=Stance.STANDING, name="red_cylinder", confidence=0.9, visible=1.0):
     position = None if x is None else (x, y, z)
     return ThingSeen(
-        name=name, position_m=position, stance=stance, axis_rad=None, confidence=confidence, visible=1.0
+        name=name, position_m=position, stance=stance, axis_rad=None, confidence=confidence, visible=visible
     )  # fmt: skip
 
 
@@ -60,6 +60,17 @@ def test_another_place_is_believed_when_as_many_pictures_running_as_asked_agree_
         assert track.place.position_m[0] == pytest.approx(0.3, abs=1e-3)
     track.note(at(0.4), 9)
     assert track.place.position_m[0] == 0.4
+
+
+def test_a_freer_sight_stands_for_itself_and_a_worse_one_only_says_that_it_is_still_there():
+    track = PlaceTrack(STEADY)
+    for k in range(3):
+        track.note(at(0.304, visible=0.6), k)
+    track.note(at(0.300, visible=0.9), 3)
+    assert track.place.position_m[0] == 0.300
+    track.note(at(0.304, visible=0.6), 4)
+    assert track.place.position_m[0] == 0.300
+    assert track.place.stamp_ns == 4
 
 
 def test_what_is_not_seen_or_stands_otherwise_does_not_move_what_is_known():
