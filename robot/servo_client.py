@@ -46,8 +46,8 @@ STRIDE_SLACK_S = 5.0
 CLOSE_S = 5.0
 """How long a process may take to stop its arm, where it still can, and to end."""
 WHILE_TAKING = (
-    "it was lost while it took command, when no watchdog may have been armed yet: a program that it left on the arm is "
-    "ended as soon as the controller can be reached, for 2 s; after that look at the pendant"
+    "it was lost while it took command, when no watchdog may have been armed yet: a program that it left is ended as "
+    "soon as the controller can be reached, for 2 s; after that look at the pendant"
 )
 COAST_S = 0.5
 """Longer than the controller's watchdog waits and the arm then takes to rest."""
