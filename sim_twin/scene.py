@@ -34,7 +34,7 @@ _FIXTURE = {"contype": FIXTURE_CONTACT[0], "conaffinity": FIXTURE_CONTACT[1]}
 # Boxes and lids wear padding that gives way under a finger: a hand that strikes a lid's edge is not broken.
 _PADDED = {**_FIXTURE, "friction": [0.6, 0.01, 0.0001], "solref": [0.03, 1.0], "priority": 1}
 # A finger that came down beside a button bent its rubber foot out of the way, and the bare pad above it caught the rim
-# with 700 N: buttons are as soft to a pad as they are to the foot.
+# with 700 N: rings are as soft to a pad as they are to the foot. Caps are not: a pad would sink in, not press.
 _RIMMED = {
     **_FIXTURE, "friction": [0.6, 0.01, 0.0001], "solref": BUMPER_SOLREF, "solimp": BUMPER_SOLIMP, "priority": 1
 }  # fmt: skip
@@ -138,7 +138,7 @@ def _add_button(spec: mujoco.MjSpec, button: Button, table_m: float) -> None:
     )  # fmt: skip
     cap.add_geom(
         name=on_table(button.name, "cap"), type=_CYLINDER, size=[radius, cap_half, 0], mass=0.05,
-        rgba=[*button.colour, 1], **_RIMMED,
+        friction=[0.6, 0.01, 0.0001], rgba=[*button.colour, 1], **_FIXTURE,
     )  # fmt: skip
     cap.add_geom(
         name=on_table(button.name, "dome"), type=mujoco.mjtGeom.mjGEOM_ELLIPSOID,

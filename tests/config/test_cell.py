@@ -98,4 +98,14 @@ def test_lab_is_virtual_lab_with_another_address_and_serial_and_what_a_real_arm_
     virtual, lab = shipped_tree("rigs", "virtual_lab"), shipped_tree("rigs", "lab")
     assert load_rig("lab").address is None
     differing = {key for key in virtual.keys() | lab.keys() if virtual.get(key) != lab.get(key)}
-    assert differing == {"name", "description", "address", "bus", "expected", "perception", "operator", "reset"}
+    assert differing == {
+        "name",
+        "description",
+        "address",
+        "bus",
+        "nodes",
+        "expected",
+        "perception",
+        "operator",
+        "reset",
+    }
