@@ -150,8 +150,8 @@ def test_what_the_versions_script_calculates(station):
         mass = np.array(control.getMassMatrix()).reshape(6, 6)
         assert np.abs(mass - mass.T).max() < 1e-6
         assert (np.linalg.eigvalsh(mass) > 0.0).all()
-        jacobian = np.array(control.getJacobian()).reshape(6, 6)
-        assert abs(np.linalg.det(jacobian)) > 1e-3
+        # The client reads what was calculated last where it was quick (facts 1.12, 6): the mass matrix once more.
+        assert until(lambda: abs(np.linalg.det(np.reshape(control.getJacobian(), (6, 6)))) > 1e-3, 2.0)
     if version == "5.26.0":
         before = station.q
         assert control.directTorque([0.0] * 6, [0.0] * 6, [0.0] * 6)
