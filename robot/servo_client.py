@@ -13,7 +13,7 @@ from config.resolved import Resolved
 from robot.errors import NotEngagedError, RobotError, StaleStateError, WireError
 from robot.hal.leftover import Leftover
 from robot.messages import ArmState, GripCommand, Intent, PlantIdentity, Vec3
-from robot.servo_failures import cut_short, error_of
+from robot.servo_failures import WHILE_TAKING, cut_short, error_of
 from robot.servo_messages import (
     BeginEpoch,
     Close,
@@ -45,10 +45,6 @@ STRIDE_SLACK_S = 5.0
 """How much later than it should a time step may end while the process still ticks."""
 CLOSE_S = 5.0
 """How long a process may take to stop its arm, where it still can, and to end."""
-WHILE_TAKING = (
-    "it was lost while it took command, when no watchdog may have been armed yet: a program that it left is ended as "
-    "soon as the controller can be reached, for 2 s; after that look at the pendant"
-)
 COAST_S = 0.5
 """Longer than the controller's watchdog waits and the arm then takes to rest."""
 
