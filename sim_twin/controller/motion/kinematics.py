@@ -12,7 +12,8 @@ import msgspec
 import numpy as np
 
 from config.arm import ArmConfig
-from sim_twin.controller.motion.poses import Array, between, inverse, matrix_from_pose, pose_from_matrix, vec6
+from sim_twin.controller.motion.chain import chain_and_jacobian, chain_end
+from sim_twin.controller.motion.poses import Array, between, inverse, matrix_from_pose, pose_from_matrix, six, vec6
 
 __all__ = [
     "ArmKinematics",
@@ -36,6 +37,8 @@ MAX_STEP_RAD = 0.4
 SINGULAR_DET = 1e-5
 """Smallest |det J| of a pose that can be left in every direction; the UR5e's greatest is about 0.07."""
 SINGULAR_SINE = 1e-7
+FLANGE = np.eye(4)
+"""The tool of an arm without one."""
 
 
 class KinematicsError(ValueError):
@@ -98,12 +101,13 @@ class ArmKinematics:
         """Take another table for the arm's own from now on."""
         self.rows = true
         self._is_nominal = self.rows == self._nominal
-        self._constants = tuple((r.a_m, r.d_m, math.cos(r.alpha_rad), math.sin(r.alpha_rad)) for r in self.rows)
-        self._offsets = tuple(r.theta_rad for r in self.rows)
+        self._table = np.array(
+            [(r.theta_rad, r.a_m, r.d_m, math.cos(r.alpha_rad), math.sin(r.alpha_rad)) for r in self.rows]
+        )
 
     def forward(self, q_rad: Sequence[float] | Array, T_ft: Array | None = None) -> Array:
         """Return T_bt for joint angles; of the flange where no tool is given.  (6,), (4, 4) -> (4, 4)"""
-        T_bf = self._frames(q_rad)[1]
+        T_bf = chain_end(six(q_rad), self._table)
         return T_bf if T_ft is None else T_bf @ T_ft
 
     def pose(self, q_rad: Sequence[float] | Array, tcp: Sequence[float] | Array | None = None) -> Array:
@@ -112,14 +116,8 @@ class ArmKinematics:
 
     def forward_and_jacobian(self, q_rad: Sequence[float] | Array, T_ft: Array | None = None) -> tuple[Array, Array]:
         """Return T_bt and J with (v, w) = J qd at the tool, base axes.  (6,), (4, 4) -> (4, 4), (6, 6)"""
-        axes, T_bf = self._frames(q_rad)
-        T_bt = T_bf if T_ft is None else T_bf @ T_ft
-        px, py, pz = T_bt[0, 3].item(), T_bt[1, 3].item(), T_bt[2, 3].item()
-        columns = []
-        for zx, zy, zz, ox, oy, oz in axes:
-            rx, ry, rz = px - ox, py - oy, pz - oz
-            columns.append((zy * rz - zz * ry, zz * rx - zx * rz, zx * ry - zy * rx, zx, zy, zz))
-        return T_bt, np.array(columns).T
+        T = FLANGE if T_ft is None else np.ascontiguousarray(T_ft, dtype=np.float64)
+        return chain_and_jacobian(six(q_rad), self._table, T)
 
     def jacobian(self, q_rad: Sequence[float] | Array, T_ft: Array | None = None) -> Array:
         """Return J with (v, w) = J qd at the tool, base axes.  (6,), (4, 4) -> (6, 6)"""
@@ -210,24 +208,6 @@ class ArmKinematics:
             return self.refine(T_bf, seed)
         except KinematicsError:
             return None
-
-    def _frames(self, q_rad: Sequence[float] | Array) -> tuple[list[tuple[float, ...]], Array]:
-        """Return every joint's axis and origin (z, o) in base axes, and T_bf, in plain floats for speed."""
-        xx, xy, xz, yx, yy, yz, zx, zy, zz = 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0
-        ox = oy = oz = 0.0
-        axes = []
-        values = q_rad.tolist() if isinstance(q_rad, np.ndarray) else q_rad
-        for q, theta, (a, d, ca, sa) in zip(values, self._offsets, self._constants, strict=True):
-            axes.append((zx, zy, zz, ox, oy, oz))
-            s, c = math.sin(q + theta), math.cos(q + theta)
-            ux, uy, uz = c * xx + s * yx, c * xy + s * yy, c * xz + s * yz
-            vx, vy, vz = c * yx - s * xx, c * yy - s * xy, c * yz - s * xz
-            ox, oy, oz = ox + a * ux + d * zx, oy + a * uy + d * zy, oz + a * uz + d * zz
-            xx, xy, xz = ux, uy, uz
-            yx, yy, yz = ca * vx + sa * zx, ca * vy + sa * zy, ca * vz + sa * zz
-            zx, zy, zz = ca * zx - sa * vx, ca * zy - sa * vy, ca * zz - sa * vz
-        T = np.array([[xx, yx, zx, ox], [xy, yy, zy, oy], [xz, yz, zz, oz], [0.0, 0.0, 0.0, 1.0]])
-        return axes, T
 
 
 def joint_speeds_of(J: Array, twist: Array) -> Array:

@@ -10,12 +10,15 @@ what goes on pressing after it. Who stands beyond a limit or a plane may stand t
 import math
 from collections.abc import Iterable, Sequence
 from enum import Enum
+from operator import le
 
 import msgspec
 import numpy as np
 
 from config.arm import ArmConfig
-from sim_twin.controller.motion.poses import Array
+from robot.messages import Vec6
+from sim_twin.controller.motion.plain import is_plainly_asked, is_plainly_felt
+from sim_twin.controller.motion.poses import Array, six
 from sim_twin.controller.motion.setpoint import SLICE_S
 
 __all__ = [
@@ -113,13 +116,13 @@ class Plane(msgspec.Struct, frozen=True, kw_only=True):
 class SafetyLimits(msgspec.Struct, frozen=True, kw_only=True):
     """One set of limits; a robot has one for normal and one for reduced mode."""
 
-    q_min_rad: tuple[float, ...]
-    q_max_rad: tuple[float, ...]
-    speed_rad_s: tuple[float, ...]
+    q_min_rad: Vec6
+    q_max_rad: Vec6
+    speed_rad_s: Vec6
     tool_speed_m_s: float = 3.0
     tool_force_n: float = 250.0
     deviation_rad: float = 0.25
-    collision_nm: tuple[float, ...] = (110.0, 110.0, 110.0, 22.0, 22.0, 22.0)
+    collision_nm: Vec6 = (110.0, 110.0, 110.0, 22.0, 22.0, 22.0)
     """Torque from outside on a joint that counts as a collision."""
     planes: tuple[Plane, ...] = ()
 
@@ -157,9 +160,9 @@ class Felt(msgspec.Struct, frozen=True, kw_only=True):
 def default_limits(arm: ArmConfig) -> SafetyLimits:
     """Return limits from the arm's file: ranges (the twin's elbow has half of UR's), full speed, force."""
     return SafetyLimits(
-        q_min_rad=tuple(j.range_rad[0] for j in arm.joints),
-        q_max_rad=tuple(j.range_rad[1] for j in arm.joints),
-        speed_rad_s=tuple(j.speed_rad_s for j in arm.joints),
+        q_min_rad=six([j.range_rad[0] for j in arm.joints]),
+        q_max_rad=six([j.range_rad[1] for j in arm.joints]),
+        speed_rad_s=six([j.speed_rad_s for j in arm.joints]),
         tool_force_n=arm.motion.force_limit_n,
         deviation_rad=arm.motion.tracking_error_rad,
     )
@@ -168,6 +171,12 @@ def default_limits(arm: ArmConfig) -> SafetyLimits:
 def breach_asked(limits: SafetyLimits, asked: Asked) -> Breach | None:
     """Return the first limit that a set-point passes, or None."""
     q, qd = asked.q_rad.tolist(), asked.qd_rad_s.tolist()
+    is_plain = is_plainly_asked(six(q), six(qd), (limits.q_min_rad, limits.q_max_rad), limits.speed_rad_s)
+    breach = None if is_plain else _joints_asked(limits, q, qd)
+    return breach or _tool_asked(limits, asked)
+
+
+def _joints_asked(limits: SafetyLimits, q: list[float], qd: list[float]) -> Breach | None:
     if not all(map(math.isfinite, q)):
         return Breach(cause=Cause.NOT_FINITE, text="target position is not a number; check what the program computes")
     speed = [abs(v) for v in qd]
@@ -183,10 +192,16 @@ def breach_asked(limits: SafetyLimits, asked: Asked) -> Breach | None:
     i = _first((x - high if v > 0.0 else low - x) if v else 0.0 for x, v, low, high in ranges)
     if i is not None:
         return _breach(Cause.JOINT_LIMIT, i, f"target {q[i]:.3f} rad is beyond the joint's limit")
+    return None
+
+
+def _tool_asked(limits: SafetyLimits, asked: Asked) -> Breach | None:
     tool_m_s = math.dist(asked.tool_m.tolist(), asked.tool_before_m.tolist()) / SLICE_S
     if not tool_m_s <= limits.tool_speed_m_s * (1.0 + ROUNDING):
         text = f"target moves the tool at {tool_m_s:.2f} m/s, limit {limits.tool_speed_m_s:.2f}"
         return Breach(cause=Cause.TARGET_TOOL_SPEED, text=text)
+    if not limits.planes:
+        return None
     leaving = tuple(p for p in limits.planes if float(np.dot(p.normal, asked.tool_m - asked.tool_before_m)) < 0.0)
     if _is_beyond(leaving, asked.tool_m, 0.0):
         return Breach(cause=Cause.PLANE, text="target position is beyond a safety plane")
@@ -201,7 +216,18 @@ def breach_felt(limits: SafetyLimits, felt: Felt) -> Breach | None:
 
     A force is no violation before it has lasted: its stop comes first.
     """
-    return _violation(limits, felt) or _collision(limits, felt)
+    return None if _is_plainly_felt(limits, felt) else _violation(limits, felt) or _collision(limits, felt)
+
+
+def _is_plainly_felt(limits: SafetyLimits, felt: Felt) -> bool:
+    """Return whether nothing is near a limit, tolerances aside; what is not may still be no breach."""
+    if limits.planes or not (felt.tool_speed_m_s <= limits.tool_speed_m_s and felt.force_n <= limits.tool_force_n):
+        return False
+    return is_plainly_felt(
+        six(felt.q_rad), six(felt.qd_rad_s), six(felt.q_expected_rad),
+        six(felt.external_nm), (limits.q_min_rad, limits.q_max_rad),
+        (limits.speed_rad_s, limits.collision_nm, limits.deviation_rad),
+    )  # fmt: skip
 
 
 def _violation(limits: SafetyLimits, felt: Felt) -> Breach | None:
@@ -228,7 +254,10 @@ def is_outside(limits: SafetyLimits, q_rad: Array, tool_m: Array) -> bool:
 
     (6,), (3,)
     """
-    ranges = zip(q_rad.tolist(), limits.q_min_rad, limits.q_max_rad, strict=True)
+    q = q_rad.tolist()
+    if not limits.planes and all(map(le, limits.q_min_rad, q)) and all(map(le, q, limits.q_max_rad)):
+        return False
+    ranges = zip(q, limits.q_min_rad, limits.q_max_rad, strict=True)
     beyond = (max(x - high, low - x) - JOINT_TOLERANCE_RAD for x, low, high in ranges)
     return _first(beyond) is not None or _is_beyond(limits.planes, tool_m, PLANE_TOLERANCE_M)
 

@@ -10,6 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from robot.messages import Vec6
+
 __all__ = [
     "Array",
     "between",
@@ -21,6 +23,7 @@ __all__ = [
     "pose_trans",
     "rotation",
     "rotation_vector",
+    "six",
     "vec6",
 ]
 
@@ -38,6 +41,12 @@ def vec6(values: Sequence[float] | Array, what: str = "joints") -> Array:
     if array.shape != (6,) or not np.isfinite(array).all():
         raise ValueError(f"{what}: expected six finite numbers, got {values!r}; check the list or pose given")
     return array
+
+
+def six(values: Sequence[float] | Array) -> Vec6:
+    """Return six numbers, finite or not, as machine code takes them.  (6,) -> (6,)"""
+    a, b, c, d, e, f = values.tolist() if isinstance(values, np.ndarray) else map(float, values)
+    return a, b, c, d, e, f
 
 
 def length(vector: Array) -> float:

@@ -198,3 +198,31 @@ def test_codes_are_written_as_ur_writes_them():
     assert Breach(cause=Cause.TOOL_COLLISION, text="").code == "C158A0"
     assert Breach(cause=Cause.FORCE_VIOLATION, text="").code == ""
     assert len(list(Cause)) == len({c.value for c in Cause})
+
+
+FAR = msgspec.structs.replace(LIMITS, planes=(Plane(normal=(0.0, 0.0, 1.0), offset_m=-1e6),))
+"""No limit more than without planes, but every one of them is looked at by itself."""
+OPEN = msgspec.structs.replace(LIMITS, planes=())
+EDGES = [x for e in (0.0, PI, TWO_PI, 22.0, 110.0, 0.25, 1.5, 250.0) for x in (e, -e, after(e), np.nan, np.inf)]
+NUMBERS = st.sampled_from(EDGES) | st.floats(-7.0, 7.0)
+SIX = st.lists(NUMBERS, min_size=6, max_size=6).map(np.array)
+
+
+@given(q=SIX, qd=SIX, i=st.integers(0, 5), odd=NUMBERS)
+def test_who_is_plainly_within_what_is_asked_has_no_breach_limit_by_limit(q, qd, i, odd):
+    for joints, speeds in ((q, qd), (at(i, odd), np.zeros(6)), (np.zeros(6), at(i, odd)), (at(i, odd), at(i, odd))):
+        one = asked(q_rad=joints, qd_rad_s=speeds)
+        assert breach_asked(OPEN, one) == breach_asked(FAR, one)
+
+
+@given(
+    i=st.integers(0, 5), odd=NUMBERS, other=NUMBERS, pressed_s=st.sampled_from([0.0, 1.0]),
+    what=st.sampled_from(["q_rad", "qd_rad_s", "q_expected_rad", "external_nm"]),
+)  # fmt: skip
+def test_who_plainly_feels_nothing_has_no_breach_limit_by_limit(i, odd, other, pressed_s, what):
+    for one in (
+        felt(**{what: at(i, odd)}),
+        felt(**{what: at(i, odd)}, force_n=abs(other), tool_speed_m_s=abs(odd), pressed_s=pressed_s),
+    ):
+        assert breach_felt(OPEN, one) == breach_felt(FAR, one)
+        assert is_outside(OPEN, one.q_rad, one.tool_m) == is_outside(FAR, one.q_rad, one.tool_m)
