@@ -6,7 +6,7 @@ from types import GeneratorType
 
 from sim_twin.controller.script.code import Builtin, Code, Fast, Frame, Slow, applied
 from sim_twin.controller.script.context import Context, Routine, Scope, takes_time
-from sim_twin.controller.script.costs import WRITING, length_cost, text_cost
+from sim_twin.controller.script.costs import NUMBERS, WRITING, length_cost, text_cost
 from sim_twin.controller.script.errors import ScriptRuntimeError
 from sim_twin.controller.script.syntax import Call, Definition, Expression, Place, Run
 from sim_twin.controller.script.threads import Steps, Wait
@@ -190,6 +190,14 @@ def _costs_of(builtin: str, own: int) -> Callable[[Sequence[Value]], int]:
     return lambda values: own + sum(map(length_cost, values))
 
 
+def _are_numbers(values: Sequence[Value]) -> bool:
+    """Return whether values are numbers alone: those need no copies, and cost nothing to go through."""
+    for value in values:  # noqa: SIM110 - half of what a generator takes
+        if type(value) not in NUMBERS:
+            return False
+    return True
+
+
 def _call_of_builtin(
     called: str,
     builtin: Builtin,
@@ -198,7 +206,8 @@ def _call_of_builtin(
     context: Context,
 ) -> Code[Value]:
     n_positional, names = len(positional), list(keywords)
-    spend, copied, cost_with = context.meter.spend, context.copied, _costs_of(called, context.cost(called))
+    own = context.cost(called)
+    spend, copied, cost_with = context.meter.spend, context.copied, _costs_of(called, own)
 
     def failed(error: Exception, values: Sequence[Value]) -> ScriptRuntimeError:
         return ScriptRuntimeError(f"{called}(): {_reason(error, values)}")
@@ -221,9 +230,10 @@ def _call_of_builtin(
         return _slow_builtin(operands, result_of, failed)
 
     def value_of(*values: Value) -> Value:
-        spend(cost_with(values))
+        is_plain = _are_numbers(values)
+        spend(own if is_plain else cost_with(values))
         try:
-            result = function(*map(copied, values))
+            result = function(*values) if is_plain else function(*map(copied, values))
         except _BAD_ARGUMENTS as error:
             raise failed(error, values) from error
         if type(result) is GeneratorType:

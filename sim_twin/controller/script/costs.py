@@ -15,6 +15,7 @@ from sim_twin.controller.script.values import ScriptStruct, Value, copied_and_co
 __all__ = [
     "BUILTIN",
     "CALL",
+    "NUMBERS",
     "WRITING",
     "Spend",
     "copier",
@@ -35,7 +36,7 @@ _N_CHARACTERS = 128  # a step
 _PART = 12  # a pose, a string, a list or a struct within another
 _SWITCH = 6  # where a thread waits for others, beside its turn
 _PLACE = 6  # where a part of a variable is assigned
-_NUMBERS = frozenset({bool, int, float})
+NUMBERS = frozenset({bool, int, float})
 _WRITTEN, _MIXED = 3, 6  # a number as text, in a list of numbers and in any other
 _POSE = 16
 WRITING = frozenset({"popup", "socket_send_line", "socket_send_string", "str_cat", "textmsg", "to_str"})
@@ -77,14 +78,14 @@ def length_cost(value: Value) -> int:
     if type(value) is str:
         return len(value) // _N_CHARACTERS
     if type(value) is list:
-        return len(value) // _N_COPIED + sum(_PART + length_cost(part) for part in value if type(part) not in _NUMBERS)
+        return len(value) // _N_COPIED + sum(_PART + length_cost(part) for part in value if type(part) not in NUMBERS)
     return sum(_PART + length_cost(part) for part in value.members.values()) if type(value) is ScriptStruct else 0
 
 
 def text_cost(value: Value) -> int:
     """Return what it costs to write a value out, beside going through it; a number among other things takes longer."""
     if type(value) is list:
-        others = [part for part in value if type(part) not in _NUMBERS]
+        others = [part for part in value if type(part) not in NUMBERS]
         written = (_MIXED if others else _WRITTEN) * len(value)
         return written + sum(_PART + text_cost(part) for part in others)
     if type(value) is ScriptStruct:
