@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable, Iterable, Sequence
+from pathlib import PurePath
 
 from config.arm import ArmConfig
 from config.cell import CellConfig
@@ -11,9 +12,19 @@ from config.learning import LearningConfig
 from config.rig import Rig
 from config.rules import RuleSet
 from config.scenario import Cylinder, Goal, GoalKind, Scenario
+from config.sweep import Sweep
 from config.yaml_text import join
 
-__all__ = ["RESERVED_NAMES", "Checker", "check_arm", "check_learning", "check_rig", "check_rules", "check_scenario"]
+__all__ = [
+    "RESERVED_NAMES",
+    "Checker",
+    "check_arm",
+    "check_learning",
+    "check_rig",
+    "check_rules",
+    "check_scenario",
+    "check_sweep",
+]
 
 RESERVED_NAMES = ("table", "gripper", "hand", "tool", "world")
 """Names that mean something by themselves in distances, rules or the simulated world."""
@@ -141,6 +152,15 @@ def check_rig(rig: Rig, file: str) -> None:
     n_steps = rig.tick_s / rig.physics_s
     is_whole = n_steps >= 0.5 and abs(n_steps - round(n_steps)) < 1e-6
     Checker(file).need(is_whole, "physics_s", f"a whole part of tick_s = {rig.tick_s:g}", f"{rig.physics_s:g}")
+
+
+def check_sweep(sweep: Sweep, file: str) -> None:
+    """Check that nothing comes twice, by the names that the cells will have."""
+    checker = Checker(file)
+    for key in ("presets", "scenarios", "rigs"):
+        stems = [(f"{key}[{i}]", PurePath(name).stem) for i, name in enumerate(getattr(sweep, key))]
+        checker.unique(stems, "a file's name")
+    checker.unique(((f"seeds[{i}]", seed) for i, seed in enumerate(sweep.seeds)), "a seed")
 
 
 def check_cell(cell: CellConfig, file: str) -> None:

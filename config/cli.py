@@ -7,7 +7,17 @@ import typer
 
 from config.errors import ConfigError
 from config.kinds import Kind, check_file
-from config.loader import load_arm, load_cell, load_learning, load_limits, load_rig, load_rules, load_wired, resolve
+from config.loader import (
+    load_arm,
+    load_cell,
+    load_learning,
+    load_limits,
+    load_rig,
+    load_rules,
+    load_sweep,
+    load_wired,
+    resolve,
+)
 from config.resolved import dump_resolved
 from config.sources import shipped_names
 
@@ -22,6 +32,7 @@ SHIPPED = {
     "rigs": load_rig,
     "rules": load_rules,
     "scenarios": load_wired,
+    "sweeps": load_sweep,
 }
 
 app = typer.Typer(no_args_is_help=True, help="Check and show config files.")

@@ -17,6 +17,7 @@ from config.loader import (
     load_resolved,
     load_rig,
     load_rules,
+    load_sweep,
     load_wired,
 )
 from config.resolved import Resolved
@@ -24,6 +25,7 @@ from config.rig import Rig
 from config.rules import RuleSet
 from config.scenario import Scenario
 from config.sources import read_path
+from config.sweep import Sweep
 from config.values import Section
 from config.yaml_text import parse_yaml, shown
 
@@ -41,6 +43,7 @@ class Kind(StrEnum):
     RIG = "rig"
     RULES = "rules"
     SCENARIO = "scenario"
+    SWEEP = "sweep"
 
 
 COMMON_KEYS = ("name", "description")
@@ -53,6 +56,7 @@ STRUCTS: dict[Kind, type[Section]] = {
     Kind.RIG: Rig,
     Kind.RULES: RuleSet,
     Kind.SCENARIO: Scenario,
+    Kind.SWEEP: Sweep,
 }
 LOADERS: dict[Kind, Callable[[Path], object]] = {
     Kind.ARM: load_arm,
@@ -63,6 +67,7 @@ LOADERS: dict[Kind, Callable[[Path], object]] = {
     Kind.RIG: load_rig,
     Kind.RULES: load_rules,
     Kind.SCENARIO: load_wired,
+    Kind.SWEEP: load_sweep,
 }
 
 

@@ -8,7 +8,7 @@ import msgspec
 
 from config.arm import ArmConfig
 from config.cell import CellConfig
-from config.checks import check_arm, check_cell, check_learning, check_rig, check_rules, check_scenario
+from config.checks import check_arm, check_cell, check_learning, check_rig, check_rules, check_scenario, check_sweep
 from config.decode import decode
 from config.errors import ConfigError
 from config.learning import LearningConfig
@@ -21,6 +21,7 @@ from config.rig import DEFAULT_LIMITS, Rig
 from config.rules import RuleSet
 from config.scenario import Scenario
 from config.sources import Source, is_path, read_path, read_source
+from config.sweep import Sweep
 from config.wiring import check_cell_fits, check_reachable, check_wiring
 from config.workspace import fenced
 from config.yaml_text import Tree, parse_yaml
@@ -34,6 +35,7 @@ __all__ = [
     "load_rig",
     "load_rules",
     "load_scenario",
+    "load_sweep",
     "load_wired",
     "resolve",
     "with_rig",
@@ -85,6 +87,22 @@ def load_limits(name: str | Path, *, base: Path | None = None) -> LimitsFile:
 def load_rules(name: str | Path, *, base: Path | None = None) -> RuleSet:
     """Return a rule set: a shipped one's name, or a path, relative ones starting from base."""
     return _load_rules(read_source("rules", name, base=base))
+
+
+def load_sweep(name: str | Path) -> Sweep:
+    """Return a sweep: `paper`, or a path. The files it names are paths from where it lies; they are not looked at."""
+    source = read_source("sweeps", name)
+    sweep = _decode(source, Sweep)
+    check_sweep(sweep, source.file)
+    if source.folder is None:
+        return sweep
+    folder = source.folder.resolve()
+    return msgspec.structs.replace(
+        sweep,
+        presets=tuple(_from(folder, preset) for preset in sweep.presets),
+        scenarios=tuple(_from(folder, scenario) for scenario in sweep.scenarios),
+        rigs=tuple(_from(folder, rig) for rig in sweep.rigs),
+    )
 
 
 def load_scenario(name: str | Path) -> Scenario:

@@ -14,10 +14,10 @@ from rich.text import Text
 from learning.consent import Consent
 from learning.ended import Ended
 from learning.errors import LearningError, RunFolderError
-from learning.figures import curriculum_figure, performance_figure, save
 from learning.progress import Progress, Status
 from learning.recording import RecordWanted
 from learning.report import Run, group_runs, load_run, load_runs, report_of
+from learning.report_files import write_report
 from learning.run_folder import RunFolder
 from learning.stopwatch import Stopwatch
 from learning.telling import explanation_table, profile_table, report_table, score_table, summary_lines
@@ -110,7 +110,7 @@ def learn(
             session.close()
         run = load_run(folder)
         folder.write_json("summary.json", run.summary)
-        _write_figures([run], folder.figures)
+        write_report([run], folder.figures)
     if json:
         typer.echo(msgspec.json.encode(run.summary).decode())
     else:
@@ -236,7 +236,7 @@ def _report_folder(runs: Sequence[Run], *, is_whole: bool) -> Path:
 
 
 def _report(runs: Sequence[Run], folder: Path, *, json: bool) -> None:
-    paths = _write_figures(runs, folder)
+    paths = write_report(runs, folder)
     groups = group_runs(runs)
     if json:
         typer.echo(msgspec.json.encode(report_of(groups)).decode())
@@ -247,18 +247,6 @@ def _report(runs: Sequence[Run], folder: Path, *, json: bool) -> None:
         typer.echo(f"{path}: {stops.line()}")
     for path in paths:
         typer.echo(path)
-
-
-def _write_figures(runs: Sequence[Run], folder: Path) -> list[Path]:
-    """Draw the figures of runs, write them and their figures of merit, and return the files."""
-    groups = group_runs(runs)
-    paths = [
-        *save(performance_figure(groups), folder, "figure2"),
-        *save(curriculum_figure(groups), folder, "curriculum"),
-        folder / "summary.json",
-    ]
-    paths[-1].write_bytes(msgspec.json.format(msgspec.json.encode(report_of(groups)), indent=2) + b"\n")
-    return paths
 
 
 def _tell(run: Run, ended: Ended) -> None:

@@ -18,7 +18,7 @@ ROOT = Path(__file__).parents[1]
 ROOMS = ("config", "learning", "perception", "robot", "sim_twin")
 OF_TESTS = re.compile(r"(?:^|[/_])tests?[/_.]")
 QUICK = "experiment: {trials: 2, steps: 30, evaluate_every: 2, test_epochs: 1, checkpoint_every: 1}\n"
-FOLDERS = ("arms", "cells", "learning", "limits", "rigs", "rules", "scenarios")
+FOLDERS = ("arms", "cells", "learning", "limits", "rigs", "rules", "scenarios", "sweeps")
 MEASURED = ("cameras", "colours")
 """Their files are made by a command, and checked where they are used."""
 
