@@ -31,6 +31,7 @@ from robot.messages import (
     Vec6,
 )
 from sim_twin.names import on_table
+from sim_twin.plant_reading import Addresses, Fingers, arm_reading
 from sim_twin.scene import build_scene
 from sim_twin.table import TableDrive
 
@@ -160,15 +161,16 @@ class TwinArm:
         )
         self._is_connected = False
         data, model = world.data, world.model
-        self._q, self._qd = data.qpos[:6], data.qvel[:6]
-        self._tcp = data.site_xpos[model.site("tcp").id]
-        tool = model.body("tool").id
-        self._twist, self._com = data.cvel[tool], data.subtree_com[int(model.body_rootid[tool])]
-        self._tcp_body = data.xquat[model.body("tool").id]
-        sensor = model.sensor("tool_force")
-        self._force = data.sensordata[sensor.adr[0] : sensor.adr[0] + 3]
-        self._fingers = [data.qpos[a : a + 1] for a in world.finger_addresses]
-        self._finger_speeds = [data.qvel[int(model.joint(f"finger_{s}").dofadr[0]) :][:1] for s in ("left", "right")]
+        tool, fingers = model.body("tool").id, world.finger_addresses
+        speeds = [int(model.joint(f"finger_{side}").dofadr[0]) for side in ("left", "right")]
+        self._arrays = (
+            data.qpos.reshape(1, -1), data.qvel.reshape(1, -1), data.site_xpos, data.xquat, data.cvel,
+            data.subtree_com, data.sensordata.reshape(1, -1),
+        )  # fmt: skip
+        self._addresses: Addresses = (
+            tool, int(model.body_rootid[tool]), model.site("tcp").id, int(model.sensor("tool_force").adr[0]),
+            fingers[0], fingers[1], speeds[0], speeds[1],
+        )  # fmt: skip
         self._has_object = False
         first = int(world.joint_controls[0])
         self._joint_controls = data.ctrl[first : first + 6]
@@ -185,38 +187,30 @@ class TwinArm:
         if not self._is_connected:
             raise StaleStateError("twin arm: expected connect() before read(); nothing was read")
         world = self._world
-        fx, fy, fz = self._force.tolist()
+        q, qd, place, turn, speed, pushed, fingers = self._reading()
         return ArmState(
             stamp_ns=world.clock.now_ns(),
-            q_rad=_vec6(self._q.tolist()),
-            qd_rad_s=_vec6(self._qd.tolist()),
-            tcp_position_m=_vec3(self._tcp),
-            tcp_quat=_quat(self._tcp_body),
-            tcp_speed_m_s=self._read_speed(),
-            tcp_force_n=(0.0 - fx, 0.0 - fy, 0.0 - fz),
-            grip=self._read_grip(),
+            q_rad=q,
+            qd_rad_s=qd,
+            tcp_position_m=place,
+            tcp_quat=turn,
+            tcp_speed_m_s=speed,
+            tcp_force_n=pushed,
+            grip=self._grip_of(fingers),
             digital_in=world.table.read_inputs(),
             digital_out=world.digital_out,
             mode=ArmMode.RUNNING,
         )
 
-    def _read_speed(self) -> Vec3:
-        """Return the tool's velocity as the physics has it, of the beginning of its last step.
+    def _reading(self) -> tuple[Vec6, Vec6, Vec3, Quat, Vec3, Vec3, Fingers]:
+        """Return what the physics says; the tool's velocity is of the beginning of its last step."""
+        return arm_reading(*self._arrays, self._addresses)
 
-        MuJoCo gives a body's velocity at its tree's centre of mass: v_tcp = v + w x (p_tcp - p_com).
-        """
-        wx, wy, wz, vx, vy, vz = self._twist.tolist()
-        (x, y, z), (cx, cy, cz) = self._tcp.tolist(), self._com.tolist()
-        x, y, z = x - cx, y - cy, z - cz
-        return vx + wy * z - wz * y, vy + wz * x - wx * z, vz + wx * y - wy * x
-
-    def _read_grip(self) -> GripState:
+    def _grip_of(self, fingers: Fingers) -> GripState:
         """Opening from the fingers; an object is what stalls a closing hand before its jaws meet."""
-        world = self._world
-        opening = self._fingers[0].item() + self._fingers[1].item()
-        speed = self._finger_speeds[0].item() + self._finger_speeds[1].item()
+        opening, speed = fingers
         is_still = abs(speed) < STILL_M_S
-        is_pressing = opening - world.opening_asked_m > HELD_GAP_M and opening > HELD_GAP_M
+        is_pressing = opening - self._world.opening_asked_m > HELD_GAP_M and opening > HELD_GAP_M
         # Once held, a short stir of the fingers is not a loss; meeting jaws or an opening hand is.
         self._has_object = is_pressing and (is_still or self._has_object)
         return GripState(opening_m=opening, is_moving=not is_still, has_object=self._has_object)
@@ -238,7 +232,7 @@ class TwinArm:
         """Hold where the arm is; a hand that holds something keeps its force, other fingers stand."""
         world = self._world
         world.begin_stop()
-        if not self._read_grip().has_object:
+        if not self._grip_of(self._reading()[-1]).has_object:
             world.opening_goal_m = world.opening_asked_m
         return True
 

@@ -1,36 +1,20 @@
 """The table's driven and sensed parts: button switches, box sensors, lid drives and locks."""
 
 import mujoco
+import numpy as np
 
-from config.scenario import Box, Button, Cylinder, Scenario
+from config.scenario import Box, Button, Scenario
+from robot.compiled import Table
 from sim_twin.names import on_table
+from sim_twin.plant_reading import table_inputs
 from sim_twin.scene import leaf_names
 
 __all__ = ["TableDrive"]
 
 CLOSES_AT, OPENS_AT = 0.6, 0.4  # shares of a button's travel
 SHUT_RAD = 0.01
-
-
-class _Switch:
-    """A button's contact with hysteresis on its travel."""
-
-    def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, button: Button) -> None:
-        address = int(model.joint(on_table(button.name, "travel")).qposadr[0])
-        self._travel_m = data.qpos[address : address + 1]
-        self._closes_m, self._opens_m = CLOSES_AT * button.travel_m, OPENS_AT * button.travel_m
-        self._bit, self._span_m = 1 << button.input, button.travel_m
-        self.is_closed = False
-
-    @property
-    def travel(self) -> float:
-        """How far it is pressed, as a share of its travel."""
-        return min(max(self._travel_m.item() / self._span_m, 0.0), 1.0)
-
-    def read(self) -> int:
-        """Return the input's bit."""
-        self.is_closed = self._travel_m.item() >= (self._opens_m if self.is_closed else self._closes_m)
-        return self._bit if self.is_closed else 0
+IS_CLOSED = 4
+"""Column of a switch's state."""
 
 
 class _Lid:
@@ -76,42 +60,36 @@ class _Lid:
             data.eq_active[lock] = not is_open and data.qpos[address] < SHUT_RAD
 
 
-class _Presence:
-    """A sensor in a box's floor that sees a cylinder standing or lying over it."""
+def _switch_row(model: mujoco.MjModel, button: Button) -> tuple[float, ...]:
+    """Return what plant_reading.table_inputs asks of a button, with hysteresis on its travel."""
+    address = int(model.joint(on_table(button.name, "travel")).qposadr[0])
+    return address, CLOSES_AT * button.travel_m, OPENS_AT * button.travel_m, 1 << button.input, 0.0
 
-    def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, box: Box, cylinders: tuple[Cylinder, ...]) -> None:
-        assert box.presence_input is not None
-        self._bit = 1 << box.presence_input
-        self._centre_m = data.xpos[model.body(on_table(box.name)).id]
-        self._half = (box.inner_m[0] / 2, box.inner_m[1] / 2, box.height_m)
-        self._positions_m = [data.xpos[model.body(on_table(c.name)).id] for c in cylinders]
 
-    def read(self) -> int:
-        """Return the input's bit."""
-        bx, by, bz = self._centre_m.tolist()
-        hx, hy, h = self._half
-        for position in self._positions_m:
-            x, y, z = position.tolist()
-            if abs(x - bx) < hx and abs(y - by) < hy and z - bz < h:
-                return self._bit
-        return 0
+def _presence_row(model: mujoco.MjModel, box: Box) -> tuple[float, ...]:
+    """Return the same of a sensor in a box's floor that sees a cylinder standing or lying over it."""
+    assert box.presence_input is not None
+    body = model.body(on_table(box.name)).id
+    return body, box.inner_m[0] / 2, box.inner_m[1] / 2, box.height_m, 1 << box.presence_input
 
 
 class TableDrive:
     """All of a scenario's wiring to the physics: inputs out of it, outputs into it."""
 
     def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, scenario: Scenario, *, tick_s: float) -> None:
-        self._switches = [_Switch(model, data, b) for b in scenario.buttons]
-        self._switch_by_input = {b.input: s for b, s in zip(scenario.buttons, self._switches, strict=True)}
+        self._qpos, self._places = data.qpos.reshape(1, -1), data.xpos
+        self._switches = _table([_switch_row(model, b) for b in scenario.buttons], 5)
+        self._travel = {
+            b.input: (int(row[0]), b.travel_m) for b, row in zip(scenario.buttons, self._switches, strict=True)
+        }
         self._lids = [_Lid(model, b, tick_s) for b in scenario.boxes if b.lid is not None]
-        self._presences = [
-            _Presence(model, data, b, scenario.cylinders) for b in scenario.boxes if b.presence_input is not None
-        ]
+        sensing = [b for b in scenario.boxes if b.presence_input is not None]
+        self._presences = _table([_presence_row(model, b) for b in sensing], 5)
+        self._cylinders = _table([(model.body(on_table(c.name)).id,) for c in scenario.cylinders], 1)
 
     def put(self, data: mujoco.MjData, digital_out: int) -> None:
         """Place lids where the outputs say and forget the switches (a reset)."""
-        for switch in self._switches:
-            switch.is_closed = False
+        self._switches[:, IS_CLOSED] = 0.0
         for lid in self._lids:
             lid.put(data, digital_out)
 
@@ -122,12 +100,7 @@ class TableDrive:
 
     def read_inputs(self) -> int:
         """Return the digital inputs as bits."""
-        bits = 0
-        for switch in self._switches:
-            bits |= switch.read()
-        for presence in self._presences:
-            bits |= presence.read()
-        return bits
+        return table_inputs(self._qpos, self._places, self._switches, self._presences, self._cylinders)
 
     def travel(self, input_number: int) -> float:
         """Return how far a button is pressed, as a share of its travel.
@@ -135,4 +108,9 @@ class TableDrive:
         Raises:
             KeyError: no button has this input.
         """
-        return self._switch_by_input[input_number].travel
+        address, span_m = self._travel[input_number]
+        return min(max(self._qpos[0, address].item() / span_m, 0.0), 1.0)
+
+
+def _table(rows: list[tuple[float, ...]], width: int) -> Table:
+    return np.array(rows, dtype=np.float64).reshape(-1, width)
