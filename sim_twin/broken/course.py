@@ -144,7 +144,7 @@ class _Run:
 
         match trial.during:
             case Moment.ENGAGE:
-                return rider.engage_into(begin)
+                return rider.engage_into(begin, after_s=trial.after_s)
             case Moment.SEED:
                 return rider.seed_into(begin)
             case Moment.STOP:
