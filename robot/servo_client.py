@@ -11,9 +11,8 @@ import msgspec
 
 from config.resolved import Resolved
 from robot.errors import NotEngagedError, RobotError, StaleStateError, WireError
-from robot.hal.leftover import Leftover
 from robot.messages import ArmState, GripCommand, Intent, PlantIdentity, Vec3
-from robot.servo_failures import WHILE_TAKING, cut_short, error_of
+from robot.servo_failures import cut_short, error_of
 from robot.servo_messages import (
     BeginEpoch,
     Close,
@@ -36,6 +35,7 @@ from robot.servo_messages import (
 from robot.servo_process import ENDING_REASONS, serve
 from robot.servo_watch import HUNG_S, ServoWatch
 from robot.surroundings import Surroundings
+from robot.taking import Taking, has_come
 from robot.tick_loop import Stride
 
 __all__ = ["ServoClient"]
@@ -71,8 +71,7 @@ class ServoClient:
         self._when_closed = when_closed
         self._resolved_json = msgspec.json.encode(resolved)
         self._tick_s = resolved.rig.tick_s
-        address = resolved.rig.address
-        self._leftover = None if address is None else Leftover(address)
+        self._taking = Taking(resolved.rig.address)
         self._process: BaseProcess | None = None
         self._connection: Connection | None = None
         self._watch: ServoWatch | None = None
@@ -137,8 +136,7 @@ class ServoClient:
         if not self._is_gone:
             return
         self.await_rest()
-        if self._leftover is not None:
-            self._leftover.wait()
+        self._taking.wait()
         ours, theirs = self._context.Pipe()
         pulse = self._context.RawArray("q", 1)
         process = self._context.Process(
@@ -161,13 +159,10 @@ class ServoClient:
         self.connect()
         self._told = self._why_lost = None
         self._halt[0] = 0
-        try:
-            self._ask(Engage(), Done, ENGAGE_S)
-        except RobotError as error:
-            if not self._is_gone or self._leftover is None:
-                raise
-            self._leftover.begin()
-            raise type(error)(f"{error}; {WHILE_TAKING}") from error
+        assert self._watch is not None, "connecting sets it"
+        with self._taking.watched(end=self._watch.kill, is_gone=lambda: self._is_gone) as alarm:
+            self._overhear()
+            self._exchange(Engage(), Done, ENGAGE_S, alarm=alarm)
         self._is_in_command = True
 
     def stop(self) -> None:
@@ -258,8 +253,7 @@ class ServoClient:
         try:
             self._end()
         finally:
-            if self._leftover is not None:
-                self._leftover.wait()
+            self._taking.wait()
             when_closed, self._when_closed = self._when_closed, None
             if when_closed is not None:
                 when_closed()
@@ -289,7 +283,7 @@ class ServoClient:
         self._overhear()
         return self._exchange(request, expected, timeout_s)
 
-    def _exchange(self, request: Request, expected: type[R], timeout_s: float) -> R:
+    def _exchange(self, request: Request, expected: type[R], timeout_s: float, *, alarm: int | None = None) -> R:
         """Ask without listening first: a time step does so itself, once, and says what it heard in place of asking.
 
         Listening here again, as it once did, kept what was said in between for later, and asked a process that had
@@ -302,8 +296,11 @@ class ServoClient:
         try:
             self._is_answer_due = True
             self._connection.send_bytes(self._encode(request))
-            reply = self._answer(self._connection, expected, timeout_s)
+            reply = self._answer(self._connection, expected, timeout_s, alarm)
             self._is_answer_due = False
+        except StaleStateError:
+            self._is_leaving = True
+            raise  # at once: a process may take 0.5 s to be gone
         except (EOFError, OSError) as error:
             raise self._gone(str(error)) from error
         if reply is None:
@@ -318,9 +315,9 @@ class ServoClient:
         assert isinstance(reply, expected), f"{type(request).__name__} was answered by {type(reply).__name__}"
         return reply
 
-    def _answer(self, connection: Connection, expected: type[R], timeout_s: float) -> Reply | None:
+    def _answer(self, connection: Connection, expected: type[R], timeout_s: float, alarm: int | None) -> Reply | None:
         """Return the next reply but what latched meanwhile, which is kept; None where none comes."""
-        while connection.poll(timeout_s):
+        while has_come(connection, timeout_s, alarm):
             reply = self._decode(connection.recv_bytes())
             if isinstance(reply, Failure) and self._is_refusal_due:
                 self._is_refusal_due = False

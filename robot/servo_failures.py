@@ -7,12 +7,7 @@ from robot.safety import Reason
 from robot.servo_messages import Failure
 from robot.tick_loop import Stride
 
-__all__ = ["WHILE_TAKING", "cut_short", "error_of"]
-
-WHILE_TAKING = (
-    "it was lost while it took command, when no watchdog may have been armed yet: a program that it left is ended as "
-    "soon as the controller can be reached, for 2 s; after that look at the pendant"
-)
+__all__ = ["cut_short", "error_of"]
 
 
 def cut_short(state: ArmState, why: str) -> Stride:

@@ -5,7 +5,7 @@ import signal
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from pathlib import Path
-from threading import Event, Thread
+from threading import Event, Lock, Thread
 
 __all__ = ["HUNG_S", "Patience", "ServoWatch"]
 
@@ -55,25 +55,32 @@ class ServoWatch:
         self._pulse = pulse
         self._stat = Path(f"/proc/{pid}/stat")
         self._process = os.pidfd_open(pid)
-        self._is_over = Event()
+        self._is_over, self._lock = Event(), Lock()
         self.was_hung = False
         self._thread = Thread(target=self._run, name="servo watch", daemon=True)
         self._thread.start()
 
     def close(self) -> None:
         """End the watch; the process goes on. Idempotent."""
-        if not self._is_over.is_set():
+        with self._lock:
+            is_first = not self._is_over.is_set()
             self._is_over.set()
+        if is_first:
             self._thread.join()
             os.close(self._process)
+
+    def kill(self) -> None:
+        """Kill the process, from any thread; one whose watch has ended is left alone."""
+        with self._lock, suppress(ProcessLookupError):
+            if not self._is_over.is_set():
+                signal.pidfd_send_signal(self._process, signal.SIGKILL)
 
     def _run(self) -> None:
         patience = Patience()
         while not self._is_over.wait(LOOK_S):
             if patience.is_over(self._pulse[0], is_asleep=self._is_asleep):
                 self.was_hung = True
-                with suppress(ProcessLookupError):
-                    signal.pidfd_send_signal(self._process, signal.SIGKILL)
+                self.kill()
                 return
 
     def _is_asleep(self) -> bool:

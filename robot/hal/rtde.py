@@ -142,11 +142,13 @@ class RtdeArm:
         with named("dashboard", self.address):
             is_remote = bool(dashboard.isInRemoteControl())
         check_ready(self.status(), is_remote=is_remote)
-        self._polled_ns = 0  # what the hand said before counts no more
-        self.read()
-        if not self._gripper.is_active:
-            self._gripper.activate(self._see_running)
+        try:
+            self.links.look()
+            self._wake_hand()
             check_ready(self.status(), is_remote=is_remote)  # somebody may have begun something meanwhile
+        except BaseException:
+            self.links.forget()
+            raise
         try:
             with named("RTDE control", self.address):
                 self._command.take(self.clock)
@@ -296,6 +298,13 @@ class RtdeArm:
         """Let the hand have its turn after the command has gone out, and none in the next read."""
         self._gripper.poll()
         self._is_hand_asked = True
+
+    def _wake_hand(self) -> None:
+        """Have the hand activated, where it is not."""
+        self._polled_ns = 0  # what it said before counts no more
+        self.read()
+        if not self._gripper.is_active:
+            self._gripper.activate(self._see_running)
 
     def _grip_where_powered(self) -> GripState:
         """Return what the hand says; of an arm that does not run the stop is told, not the hand that it leaves dead."""

@@ -58,6 +58,8 @@ class RtdeCommand:
     def take(self, clock: Clock) -> None:
         """Upload the program, have its watchdog proven, upload it anew, set payload and tool, arm the watchdog last.
 
+        The link of the client that reads is watched already.
+
         Args:
             clock: the arm's ticks.
 
@@ -67,7 +69,6 @@ class RtdeCommand:
             RuntimeError: the client's own.
         """
         receive, _ = self._readers()
-        self._links.look()
         self._links.begin_guard(receive.getTimestamp)
         self.control = self._connected()
         prove_watchdog(self.control, receive, clock)

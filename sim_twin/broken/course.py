@@ -20,7 +20,7 @@ from sim_twin.broken.rider import NEVER_S, Raised, Rider
 from sim_twin.broken.trials import JOG_RAD, Moment, Stage, Trial
 from sim_twin.broken.tries import DisturbedError, in_peace
 from sim_twin.broken.witness import Witness
-from sim_twin.controller.process import ControllerProcess, ask_fault
+from sim_twin.controller.process import ControllerProcess, ControllerProcessError, ask_fault
 from sim_twin.controller.server import Setup
 
 __all__ = ["Course"]
@@ -79,7 +79,10 @@ class Course:
     def _try(self, trial: Trial) -> Outcome:
         trace = Path(self._folder.name) / "trace"
         with ExitStack() as stack:
-            stack.enter_context(ControllerProcess(Setup(host=self._host, trace=str(trace))))
+            try:
+                stack.enter_context(ControllerProcess(Setup(host=self._host, trace=str(trace))))
+            except ControllerProcessError as error:
+                raise DisturbedError(str(error)) from error
             rider = stack.enter_context(Rider(self._host))
             witness = None if trial.shows is None else stack.enter_context(Witness(self._host, trace))
             stage = Stage(host=self._host, rider=rider, pendant=Pendant(self._host))
@@ -144,7 +147,7 @@ class _Run:
 
         match trial.during:
             case Moment.ENGAGE:
-                return rider.engage_into(begin)
+                return rider.engage_into(begin, after_s=trial.after_s)
             case Moment.SEED:
                 return rider.seed_into(begin)
             case Moment.STOP:

@@ -131,11 +131,11 @@ class Rider:
         self._get_under_way()
         return _beside(inject, 0.013, self._stop)
 
-    def engage_into(self, inject: Callable[[], float]) -> tuple[float, Raised | None]:
-        """Let something go wrong while command is being taken; the same is returned."""
+    def engage_into(self, inject: Callable[[], float], *, after_s: float) -> tuple[float, Raised | None]:
+        """Let something go wrong so long after command was asked for; the same is returned."""
         self.take()  # the hand is activated by then, which would take its time
         self.client.stop()
-        return _beside(inject, 0.2, self._engage)
+        return _beside(inject, after_s, self._engage)
 
     def seed_into(self, inject: Callable[[], float]) -> tuple[float, Raised | None]:
         """Let something go wrong between taking command and starting from what is measured; the same is returned."""

@@ -62,6 +62,8 @@ class Trial(msgspec.Struct, frozen=True, kw_only=True):
     person: Callable[[Stage], Any] = _nothing
     """What a person does before anybody may take the arm again."""
     during: Moment = Moment.RIDE
+    after_s: float = 0.2
+    """How long after command was asked for it happens, where that is the moment."""
     ends_process: bool = False
     """The stop cannot be confirmed, and the process that held the arm must end for it."""
     is_stop: bool = True
@@ -160,6 +162,13 @@ TRIALS: tuple[Trial, ...] = (
         hold_s=3.0, bars=True,
     ),
     Trial(name="cut_during_engage", begin=_by("drop"), during=Moment.ENGAGE, hold_s=1.0),
+    Trial(name="cut_at_once_during_engage", begin=_by("drop"), during=Moment.ENGAGE, after_s=0.05, hold_s=1.0),
+    Trial(name="cut_between_clients", begin=_by("drop"), during=Moment.ENGAGE, after_s=0.5, hold_s=1.0),
+    Trial(name="cut_during_second_client", begin=_by("drop"), during=Moment.ENGAGE, after_s=0.75, hold_s=1.0),
+    Trial(
+        name="frozen_between_clients", begin=_by("freeze", on=True), end=_by("freeze", on=False), during=Moment.ENGAGE,
+        after_s=0.5, hold_s=1.0,
+    ),
     Trial(name="cut_as_program_begins", begin=_cut_as_it_begins, during=Moment.ENGAGE, hold_s=1.0, is_brief=True),
     Trial(name="cut_between_engage_and_seed", begin=_by("drop"), during=Moment.SEED, hold_s=1.0),
     Trial(name="rtde_dropped", begin=_by("drop", port=30004)),

@@ -7,6 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.support.contract_rigs import open_world
+
 ROOT = Path(__file__).parents[2]
 STALLING = """
 from itertools import count
@@ -61,3 +63,24 @@ def test_a_failure_is_repeated_where_a_world_stands_and_told_as_it_is_where_none
     ).stdout
     assert told in said
     assert "KeyError" not in said
+
+
+@pytest.mark.slow
+@pytest.mark.realtime
+def test_a_plant_that_lost_its_link_is_renewed_although_a_failure_that_is_told_still_holds_its_clients():
+    """A traceback's frames do: their clients went on, and the next to engage found its registers in use."""
+    pytest.importorskip("rtde_control")
+    world = open_world("virtual_lab")
+    try:
+        plant = world.plant()
+        plant.arm.engage()
+        held = plant.arm._command.control, plant.arm._command.outputs
+        assert all(held)
+        plant.arm.links.is_lost = True
+        world.renew()
+        again = world.plant()
+        assert again is not plant
+        again.arm.engage()
+        assert again.arm.stop()
+    finally:
+        world.close()

@@ -62,3 +62,17 @@ def test_what_sleeps_out_of_command_is_left_alone(sleeper):
         sleeper.wait(0.1)
     watch.close()
     assert not watch.was_hung
+
+
+def test_whoever_knows_more_may_have_it_killed_while_it_is_watched_and_not_afterwards(sleeper):
+    watch = ServoWatch(sleeper.pid, [0])
+    watch.close()
+    watch.kill()
+    with pytest.raises(subprocess.TimeoutExpired):
+        sleeper.wait(0.1)
+    watch = ServoWatch(sleeper.pid, [0])
+    watch.kill()
+    sleeper.wait(ENDS_S)
+    watch.kill()
+    watch.close()
+    assert (watch.was_hung, sleeper.returncode) == (False, -signal.SIGKILL)
