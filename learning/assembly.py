@@ -17,7 +17,9 @@ from learning.stopwatch import Stopwatch
 from learning.subgoal_selector import make_subgoal_selector
 from robot.messages import ArmState, PlantIdentity, StationSpec
 from robot.operated import OperatedStation
+from robot.recording.bus_account import BusAccount
 from robot.rigs import build_operator, find_station
+from robot.station_doors import Accountable
 from robot.tick_tap import TickTap
 
 __all__ = ["RobotLearner", "build_agent", "learner_maker"]
@@ -63,6 +65,11 @@ class RobotLearner:
     def measured(self) -> ArmState:
         """Return the newest measurement."""
         return self._local.measured
+
+    def account(self, resolved: Resolved, *, seed: int) -> BusAccount | None:
+        """Return a way to tell a recorder on the bus what is learnt from; None where the arm is held at home."""
+        local = self._local
+        return BusAccount(local.open_account(), resolved, seed=seed) if isinstance(local, Accountable) else None
 
     def close(self) -> None:
         """Release the station. Idempotent."""

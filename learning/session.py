@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from config.resolved import Resolved, dump_resolved
+from learning.agent import Agent
 from learning.assembly import RobotLearner, build_agent, learner_maker
 from learning.checkpoint import encode
 from learning.ended import Ended
@@ -15,7 +16,7 @@ from learning.experts import ExpertSet
 from learning.offline import teach
 from learning.progress import Progress
 from learning.provenance import manifest_of
-from learning.recorded import RecordedDecisions
+from learning.recorded import RecordedDecisions, Witnesses
 from learning.recording import RecordWanted, open_recording
 from learning.run_folder import TAUGHT_NAME, Manifest, RunFolder
 from learning.stops import Stops
@@ -24,6 +25,7 @@ from learning.tables import Tables
 from learning.time_spent import TimeSpent
 from learning.wanted import Wanted, refuse_another, resolve_wanted
 from robot.oracle import rules_oracle
+from robot.recording.bus_account import BusAccount
 from robot.recording.messages import Purpose
 from robot.recording.recording import STATE, Recording
 from robot.station import Station
@@ -43,6 +45,7 @@ class Session:
         learner: RobotLearner,
         stopwatch: Stopwatch,
         recording: Recording | None = None,
+        account: BusAccount | None = None,
     ) -> None:
         self.manifest = manifest
         self.remarks: list[str] = []
@@ -53,7 +56,7 @@ class Session:
         self._resolved = resolved
         self._learner = learner
         self._stopwatch = stopwatch
-        self._recording = recording
+        self._recording, self._account = recording, account
 
     @property
     def n_done(self) -> int:
@@ -99,7 +102,8 @@ class Session:
             self._folder.keep_stops(stopped + learner.stops)
 
         self._stopwatch.lap("start-up")
-        heard = self._heard()
+        learning_station, heard = self._station(Purpose.LEARN), self._heard()
+        self._open_account()
         pool = EvaluationPool(
             tester=build_agent(self._resolved, learner.station.spec, seed=manifest.seed),
             station=self._station(Purpose.TEST),
@@ -111,7 +115,7 @@ class Session:
             experiment = Experiment(
                 plan=Plan(seed=manifest.seed, protocol=self._resolved.learning.experiment, changes=manifest.changes),
                 agent=learner.agent,
-                station=self._station(Purpose.LEARN),
+                station=learning_station,
                 pool=pool,
                 tables=tables,
                 store=self._folder.checkpoints,
@@ -119,7 +123,7 @@ class Session:
                 oracle=rules_oracle(self._resolved),
                 stopwatch=self._stopwatch,
                 when_kept=lambda: keep(before + self._spent(progress)),
-                when_captured=(lambda _n_done, _agent: None) if heard is None else heard.captured,
+                when_captured=lambda n_done, agent: self._captured(heard, n_done, agent),
             )
             if state is not None:
                 experiment.restore(state)
@@ -131,19 +135,30 @@ class Session:
         return Ended(n_done=n_done, n_epochs=manifest.n_epochs, spent=spent)
 
     def _station(self, purpose: Purpose) -> Station:
-        station = self._learner.station
-        if self._recording is None:
-            return station
-        return self._recording.station(station, purpose=purpose, measure=self._learner.measured)
+        station: Station = self._learner.station
+        for recording in (self._recording, self._account):
+            if recording is not None:
+                station = recording.station(station, purpose=purpose, measure=self._learner.measured)
+        return station
 
-    def _heard(self) -> RecordedDecisions | None:
-        """Let the agent's decisions be recorded, where a run is."""
-        if self._recording is None:
-            return None
+    def _heard(self) -> tuple[RecordedDecisions, ...]:
+        """Let the agent's decisions be recorded, where a run is, and told, where a recorder on a bus may hear them."""
         names = [goal.name for goal in self.manifest.goals]
-        heard = RecordedDecisions(self._recording, names)
-        self._learner.agent.witness = heard
+        heard = tuple(RecordedDecisions(r, names) for r in (self._recording, self._account) if r is not None)
+        if heard:
+            self._learner.agent.witness = Witnesses(*heard)
         return heard
+
+    def _open_account(self) -> None:
+        if self._account is not None:
+            agent = self._learner.agent.state_dict() if self.state is None else self.state["agent"]
+            self._account.open(self.n_done, encode(agent))
+
+    def _captured(self, heard: tuple[RecordedDecisions, ...], n_done: int, agent: Agent) -> None:
+        for recorded in heard:
+            recorded.captured(n_done, agent)
+        if self._account is not None:
+            self._account.kept(n_done, lambda: encode(agent.state_dict()))
 
     def _spent(self, progress: Progress) -> TimeSpent:
         return TimeSpent(
@@ -154,6 +169,8 @@ class Session:
 
     def close(self) -> None:
         """Release the station and finish what was recorded. Idempotent."""
+        if self._account is not None:
+            self._account.close()  # before its bus is closed with the station
         self._learner.close()
         if self._recording is not None:
             self._recording.close()
@@ -246,8 +263,9 @@ def _assemble(
         model_sha256=learner.model_sha256,
     )
     session = Session(
-        folder=folder, resolved=resolved, manifest=manifest, learner=learner, stopwatch=stopwatch, recording=recording
-    )
+        folder=folder, resolved=resolved, manifest=manifest, learner=learner, stopwatch=stopwatch, recording=recording,
+        account=learner.account(resolved, seed=seed),
+    )  # fmt: skip
     session.state = state
     return session
 

@@ -37,6 +37,7 @@ from robot.servo_watch import HUNG_S, ServoWatch
 from robot.surroundings import Surroundings
 from robot.taking import Taking, has_come
 from robot.tick_loop import Stride
+from robot.tick_notes import TickNote
 
 __all__ = ["ServoClient"]
 
@@ -91,6 +92,7 @@ class ServoClient:
         self._rests_at_s = 0.0
         """Host's monotonic time at which an arm that was lost rests at the latest."""
         self._newest: ArmState | None = None
+        self._notes: tuple[TickNote, ...] = ()
         self._n_strides = 0
         """Asked for since the arm was seeded."""
         self._epoch = 0
@@ -243,10 +245,15 @@ class ServoClient:
                 told = self._exchange(request, StrideReply, n_ticks * self._tick_s + STRIDE_SLACK_S)
         except WireError as error:
             return cut_short(self._newest, str(error))
-        stride = told.stride
+        stride, self._notes = told.stride, told.notes
         self._is_leaving |= stride.verdict is not None and stride.verdict.reason in ENDING_REASONS
         self._newest, self.is_in_contact = stride.after, stride.is_in_contact
         return stride
+
+    def take_notes(self) -> tuple[TickNote, ...]:
+        """Return what ticks of the last time step asked for, thinned; once."""
+        notes, self._notes = self._notes, ()
+        return notes
 
     def close(self) -> None:
         """Stop, release and end the process. Idempotent, never raises."""

@@ -8,6 +8,7 @@ from msgspec import Meta
 from robot.messages import ArmState, GripCommand, Intent, PlantIdentity, Vec3
 from robot.surroundings import Surroundings
 from robot.tick_loop import Stride
+from robot.tick_notes import TickNote
 
 __all__ = [
     "BeginEpoch",
@@ -107,6 +108,8 @@ class StrideReply(_Tagged, frozen=True, kw_only=True):
     stride: Stride
     is_asked: bool = True
     """It answers a request; otherwise it tells what latched between time steps."""
+    notes: tuple[TickNote, ...] = ()
+    """Of ticks since the last one."""
 
 
 class Done(_Tagged, frozen=True, kw_only=True):

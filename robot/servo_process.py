@@ -53,6 +53,7 @@ from robot.servo_messages import (
 )
 from robot.stdio import STDERR, STDOUT
 from robot.tick_loop import TickLoop
+from robot.tick_notes import TickNote, TickNotes
 
 __all__ = ["ServoServer", "serve"]
 
@@ -113,6 +114,7 @@ def serve(
     def latched(verdict: Verdict) -> None:
         server.latched(verdict)
 
+    notes = TickNotes(rate_hz=plant.arm.spec.rate_hz)
     loop = TickLoop(
         arm=plant.arm,
         config=resolved.arm,
@@ -121,6 +123,7 @@ def serve(
         rig=resolved.rig,
         profile=resolved.profile,
         when_latched=latched,
+        tap=notes,
     )
     server = ServoServer(
         connection=connection,
@@ -131,6 +134,7 @@ def serve(
         halt=halt,
         die=die,
         pin=pin,
+        notes=notes,
     )
     collect_rarely()
     code = 0
@@ -162,6 +166,7 @@ class ServoServer:
         halt: shared memory of one number: other than 0 once somebody said stop, past the pipe and whoever commands.
         die: ends the process on the spot.
         pin: keeps this thread on a CPU of its own while it is in command.
+        notes: of the loop's ticks, told with each time step.
         host_ns: the host's monotonic time, by which a station is silent; the arm's own says how old an intent is.
     """
 
@@ -176,9 +181,10 @@ class ServoServer:
         halt: Sequence[int] = (0,),
         die: Callable[[], object],
         pin: CpuPin,
+        notes: TickNotes | None = None,
         host_ns: Callable[[], int] = monotonic_ns,
     ) -> None:
-        self._cpu, self._host_ns = pin, host_ns
+        self._cpu, self._host_ns, self._notes = pin, host_ns, notes
         self._connection, self._plant, self._loop, self._tool = connection, plant, loop, arm.tool
         self._intent_max_age_ns = round(arm.motion.intent_max_age_s * 1e9)
         self._silent_ns = SILENT_AGES * self._intent_max_age_ns
@@ -209,10 +215,13 @@ class ServoServer:
         is_begun, self._n_left = self._n_left > 0, 0
         self._is_in_command = False
         stride = self._loop.report(verdict, is_begun=is_begun)
-        self._send(StrideReply(stride=stride, is_asked=is_begun or self._is_beginning))
+        self._send(StrideReply(stride=stride, is_asked=is_begun or self._is_beginning, notes=self._noted()))
         if verdict.reason == LOST:
             self._die()
         self._is_over = verdict.reason in ENDING_REASONS
+
+    def _noted(self) -> tuple[TickNote, ...]:
+        return () if self._notes is None else self._notes.take()
 
     def _take(self, raw: bytes) -> None:
         """Answer what came; what is no request latches where there is anything to latch."""
@@ -244,7 +253,7 @@ class ServoServer:
             self._n_left -= 1
             if not self._n_left:
                 self._n_over, self._answered_ns = 0, self._host_ns()
-                self._send(StrideReply(stride=self._loop.report(None, is_begun=True)))
+                self._send(StrideReply(stride=self._loop.report(None, is_begun=True), notes=self._noted()))
         else:
             self._n_over += 1
             if not self._is_resting and self._now_ns() - self._intent_ns >= self._intent_max_age_ns:

@@ -1,14 +1,17 @@
 """What a station needs of others: of perception, of a plant besides its arm, and of what holds the arm."""
 
 from collections.abc import Mapping
-from typing import Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
 from robot.hal.protocols import Camera, Resetter, SceneTruth
 from robot.messages import ArmState, GripCommand, Intent, Percept, PlantIdentity, SceneState, Vec3
 from robot.surroundings import Surroundings
 from robot.tick_loop import Stride
 
-__all__ = ["Holder", "Loop", "Perceives", "Sighted", "World"]
+if TYPE_CHECKING:
+    from robot.recording.account import Account
+
+__all__ = ["Accountable", "Holder", "Loop", "Perceives", "Sighted", "World"]
 
 
 class Perceives(Protocol):
@@ -37,6 +40,15 @@ class Sighted(Protocol):
 
     def close(self) -> None:
         """Release them. Idempotent, never raises."""
+        ...
+
+
+@runtime_checkable
+class Accountable(Protocol):
+    """A station over which a learner can tell a recorder what it learns from."""
+
+    def open_account(self) -> "Account":
+        """Return what numbers and keeps what is told."""
         ...
 
 

@@ -8,14 +8,15 @@ from typing import Any
 
 import msgspec
 
+from robot.bus.account_rows import AccountPart, AccountWritten
 from robot.bus.station_rows import Beat, Command, Health, StationAsk, StationReport, StationTold, StepDone, StopAsk
 from robot.bus.topic import Keep, Priority, Query, Role, Topic
 from robot.messages import ArmCommand, ArmState, Percept, SceneState, Verdict
 
 __all__ = [
-    "ARM_STATE", "ASK", "BEAT", "CELL", "HEALTH", "INTENT", "LAY_OUT", "PERCEPT", "PING", "QUERIES", "REPORT",
-    "REQUESTED", "RESET", "SENT", "STEP", "STOP", "TOPICS", "TRUTH", "VERDICT", "CellAction", "CellTruth", "Ping",
-    "Pong", "ResetDone", "ResetRequest",
+    "ACCOUNT", "ARM_STATE", "ASK", "BEAT", "CELL", "HEALTH", "INTENT", "LAY_OUT", "PERCEPT", "PING", "QUERIES",
+    "REPORT", "REQUESTED", "RESET", "SENT", "STEP", "STOP", "TOPICS", "TRUTH", "VERDICT", "WRITTEN", "CellAction",
+    "CellTruth", "Ping", "Pong", "ResetDone", "ResetRequest",
 ]  # fmt: skip
 
 
@@ -107,6 +108,12 @@ REPORT = Topic(
 HEALTH = Topic(
     name="health", kind=Health, writers=tuple(Role), rate_hz=2.0, deadline_s=1.0, priority=Priority.DATA,
 )  # fmt: skip
+ACCOUNT = Topic(name="account", kind=AccountPart, writers=(Role.LEARNING,), keep=Keep.ALL, is_recorded=False)
+"""What a learner perceived, decided and learnt, part by part. Not recorded as it is: its parts are, under their own
+names, in their order and without a gap."""
+WRITTEN = Topic(
+    name="account/written", kind=AccountWritten, writers=(Role.RECORDER,), rate_hz=4.0, is_recorded=False
+)  # fmt: skip
 
 RESET = Query(
     name="station/reset", request=ResetRequest, reply=ResetDone, answered_by=(Role.TWIN,),
@@ -135,6 +142,6 @@ PING = Query(name="bus/ping", request=Ping, reply=Pong, answered_by=tuple(Role),
 """Answered by every process on the bus."""
 
 TOPICS: tuple[Topic[Any], ...] = (
-    ARM_STATE, REQUESTED, SENT, VERDICT, TRUTH, PERCEPT, INTENT, STEP, BEAT, STOP, REPORT, HEALTH,
+    ARM_STATE, REQUESTED, SENT, VERDICT, TRUTH, PERCEPT, INTENT, STEP, BEAT, STOP, REPORT, HEALTH, ACCOUNT, WRITTEN,
 )  # fmt: skip
 QUERIES: tuple[Query[Any, Any], ...] = (RESET, CELL, ASK, LAY_OUT, PING)

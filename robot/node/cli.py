@@ -1,5 +1,6 @@
 """`autotelic node`: one process of a rig, as `autotelic up` starts it. The edge."""
 
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -29,3 +30,19 @@ def robot(
     with StopRequest() as end, open_robot_node(resolved) as node:
         typer.echo(f"robot node of {resolved.rig.name}: disarmed, waits for a source at {resolved.rig.bus}", err=True)
         node.run(end)
+
+
+@app.command()
+def recorder(
+    rig: Annotated[str, typer.Option(help="A shipped rig's name or a file.")] = "virtual_lab",
+    scenario: Annotated[str, typer.Option(help="A shipped scenario's name or a file.")] = "paper",
+    out: Annotated[Path, typer.Option(help="Folder for the sessions.")] = Path("sessions"),
+    person: Annotated[str, typer.Option(help="Who attends, as they want to be called in the files.")] = "unnamed",
+) -> None:
+    """Record what a rig's processes write, and what its learner tells of itself, until Ctrl-C."""
+    from robot.recording.recorder_node import run_recorder  # brings the bus
+
+    resolved = resolve(rig=rig, scenario=scenario)
+    with StopRequest() as end:
+        recorded = run_recorder(resolved, out, person=person, end=end, tell=lambda line: typer.echo(line, err=True))
+    typer.echo(f"{out}: {recorded.n} messages, {recorded.lost()} lost, {recorded.n_left_out} left out", err=True)

@@ -50,7 +50,13 @@ def open_robot_node(resolved: Resolved) -> Generator[RobotNode]:
             station.give_hand(AskedHand(arm) if is_driven else HandReflexes(arm=arm, scenario=resolved.scenario))
 
         node = RobotNode(
-            bus, station, scenario=resolved.scenario.name, profile=rig.profile, drive=drive, halt=loop.halt
+            bus,
+            station,
+            scenario=resolved.scenario.name,
+            profile=rig.profile,
+            drive=drive,
+            halt=loop.halt,
+            take_notes=loop.take_notes,
         )
         stack.callback(node.close)
         stack.callback(HealthTeller(bus, node.pulse).close)

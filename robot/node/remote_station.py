@@ -10,13 +10,15 @@ from contextlib import suppress
 from threading import Condition, Event, Thread
 from time import monotonic_ns
 from types import TracebackType
-from typing import Self
+from typing import Any, Self
 
 import msgspec
 
 from robot.as_came import AsCame, as_came
+from robot.bus.account_rows import AccountPart
 from robot.bus.errors import BusError
 from robot.bus.inlet import Received
+from robot.bus.ports import Subscriber
 from robot.bus.session import Bus
 from robot.bus.station_rows import (
     Arm,
@@ -35,7 +37,7 @@ from robot.bus.station_rows import (
     TakeLease,
     Work,
 )
-from robot.bus.topics import ARM_STATE, BEAT, INTENT, REPORT, STEP
+from robot.bus.topics import ACCOUNT, ARM_STATE, BEAT, INTENT, REPORT, STEP, WRITTEN
 from robot.errors import NotEngagedError, RobotConfigError, RobotError, SafetyError
 from robot.messages import (
     ArmState,
@@ -53,6 +55,7 @@ from robot.node.asking import AnsweredError, NodeAsker, error_of
 from robot.node.known import Known
 from robot.node.pulse import HealthTeller, Pulse
 from robot.node.stop_caller import StopCaller
+from robot.recording.account import Account
 from robot.safety import Answer, Reason
 
 __all__ = ["RemoteStation"]
@@ -91,7 +94,7 @@ class RemoteStation:
         self._percept: Percept | None = None
         self._measured: ArmState | None = None
         self._intents, self._beats = bus.publisher(INTENT), bus.publisher(BEAT)
-        self._open = (
+        self._open: tuple[Subscriber[Any], ...] = (
             bus.subscriber(STEP, self._take_step), bus.subscriber(REPORT, self._take_report),
             bus.subscriber(ARM_STATE, self._take_state),
         )  # fmt: skip
@@ -276,6 +279,18 @@ class RemoteStation:
         if done is None:
             return self._void(crossing, f"expected an answer of the robot node within {ANSWER_S:g} s, none came")
         return self._result(done, intent, crossing)
+
+    def open_account(self) -> Account:
+        """Return a way to tell a recorder on the bus what is learnt from; nothing waits for one."""
+        told = self._bus.publisher(ACCOUNT)
+
+        def put(part: AccountPart) -> None:
+            with suppress(BusError):
+                told.put(part)
+
+        account = Account(secrets.randbits(48), put=put, now_ns=self._now_ns)
+        self._open = (*self._open, self._bus.subscriber(WRITTEN, lambda received: account.take(received.message)))
+        return account
 
     def close(self) -> None:
         """Let go of the lease and leave the bus: the arm is stopped and disarmed. Idempotent, never raises."""

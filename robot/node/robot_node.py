@@ -36,13 +36,14 @@ from robot.bus.station_rows import (
     StopAsk,
     TakeLease,
 )
-from robot.bus.topics import ARM_STATE, ASK, INTENT, LAY_OUT, PERCEPT, REPORT, SENT, STEP, VERDICT
+from robot.bus.topics import ARM_STATE, ASK, INTENT, LAY_OUT, PERCEPT, REPORT, REQUESTED, SENT, STEP, VERDICT
 from robot.errors import BugError, NotEngagedError, RobotError, SafetyError
 from robot.messages import ArmState, StepResult
 from robot.node.admission import Admission
 from robot.node.inbox import Inbox, Refused
 from robot.node.pulse import Pulse
 from robot.node.served import ServedStation
+from robot.tick_notes import TickNote
 
 __all__ = ["RobotNode"]
 
@@ -65,6 +66,7 @@ class RobotNode:
         profile: of the limits.
         drive: has the station's hand do what it is asked (True), or decide by itself (False).
         halt: told of a stop at once, on the bus's thread, for an arm that is held in another process.
+        take_notes: returns what ticks of the last time step asked for, thinned.
         now_ns: this process's monotonic clock.
 
     Attributes:
@@ -74,10 +76,10 @@ class RobotNode:
     def __init__(
         self, bus: Bus, station: ServedStation, *, scenario: str, profile: str,
         drive: Callable[[bool], object] = lambda _: None, halt: Callable[[], object] = lambda: None,
-        now_ns: Callable[[], int] = monotonic_ns,
+        take_notes: Callable[[], tuple[TickNote, ...]] = tuple, now_ns: Callable[[], int] = monotonic_ns,
     ) -> None:  # fmt: skip
         self._station, self._scenario, self._profile = station, scenario, profile
-        self._drive, self._now_ns = drive, now_ns
+        self._drive, self._take_notes, self._now_ns = drive, take_notes, now_ns
         self.pulse = Pulse(now_ns=now_ns)
         assert INTENT.deadline_s is not None, "an intent grows old"
         self._admission = Admission(max_age_ns=round(INTENT.deadline_s * 1e9), now_ns=now_ns)
@@ -86,6 +88,7 @@ class RobotNode:
         self._steps, self._reports = bus.publisher(STEP), bus.publisher(REPORT)
         self._states, self._percepts = bus.publisher(ARM_STATE), bus.publisher(PERCEPT)
         self._verdicts, self._sent = bus.publisher(VERDICT), bus.publisher(SENT)
+        self._requested = bus.publisher(REQUESTED)
         self._begun, self._revision = secrets.randbits(48), 0
         self._stops: deque[int] = deque(maxlen=N_STOPS)
         self._is_final = False
@@ -184,7 +187,13 @@ class RobotNode:
         """Tell whoever watches what came of a time step, one topic each."""
         self._put(self._states, measured)
         self._put(self._percepts, result.percept)
-        if result.executed.sent is not None:
+        notes = self._take_notes()
+        for note in notes:
+            self._put(self._requested, note.requested)
+            if note.is_sent:
+                self._put(self._sent, note.requested)
+                self._put(self._verdicts, note.verdict)  # what was refused is among the time step's verdicts
+        if not notes and result.executed.sent is not None:
             self._put(self._sent, result.executed.sent)
         for verdict in result.verdicts:
             self._put(self._verdicts, verdict)

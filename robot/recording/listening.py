@@ -12,6 +12,7 @@ from typing import Any
 
 from robot.bus import Bus, Received, Topic
 from robot.recording.recorder import Recorder
+from robot.recording.topics import as_on_the_bus
 
 __all__ = ["BusListener"]
 
@@ -34,7 +35,7 @@ class BusListener:
         self._recorder = recorder
         self._came: SimpleQueue[Came] = SimpleQueue()
         self._newest_ns = self.n = 0
-        self._subscribers = [bus.subscriber(topic, partial(self._take, topic)) for topic in topics]
+        self._subscribers = [bus.subscriber(topic, partial(self._take, as_on_the_bus(topic))) for topic in topics]
 
     def run(self, should_stop: Callable[[], bool], *, poll_s: float = 0.1) -> None:
         """Record until a stop is asked for, and then what has come by then."""

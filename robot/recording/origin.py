@@ -9,7 +9,7 @@ from robot.recording.errors import UnfitError
 from robot.recording.recording import CONFIG
 from robot.recording.session_file import SessionFile
 
-__all__ = ["resolved_of"]
+__all__ = ["resolved_from", "resolved_of"]
 
 
 def resolved_of(session: SessionFile) -> Resolved:
@@ -22,6 +22,15 @@ def resolved_of(session: SessionFile) -> Resolved:
     text = session.attachment(CONFIG)
     if text is None:
         raise UnfitError(f"{session.path}: expected its config as {CONFIG}, nothing of that name is attached")
+    return resolved_from(text)
+
+
+def resolved_from(text: bytes) -> Resolved:
+    """Return what config.resolved.dump_resolved wrote, checked as if it came from its files.
+
+    Raises:
+        ConfigError: it is another version's.
+    """
     with TemporaryDirectory() as folder:
         path = Path(folder) / CONFIG
         path.write_bytes(text)

@@ -93,9 +93,16 @@ class Recorder:
         self._chunks.add(channel.lane, channel.number, channel.n, log_ns, stamp_ns, payload)
         channel.n += 1
 
-    def flush(self) -> None:
-        """Hand over what waits, however little."""
+    def flush(self, when_written: Callable[[], object] | None = None) -> None:
+        """Hand over what waits, however little.
+
+        Args:
+            when_written: called on the writing thread once it is in the file; never, where something was left out.
+        """
+        n_lost = self.n_lost
         self._chunks.flush()
+        if when_written is not None and self.n_lost == n_lost:
+            self._sink.put(lambda _file: when_written())
 
     def close(self) -> None:
         """Finish the file. Idempotent."""

@@ -104,8 +104,8 @@ class SessionFile:
         return self.metadata().get("session", {})
 
     def metadata(self) -> dict[str, dict[str, str]]:
-        """Return tables of texts by their names."""
-        found = (MetadataRecord.read(self._cursor(m.at, m.length, Op.METADATA)) for m in self._metadata)
+        """Return tables of texts by their names; of several of one name, as in what was merged, the first."""
+        found = (MetadataRecord.read(self._cursor(m.at, m.length, Op.METADATA)) for m in reversed(self._metadata))
         return {record.name: record.values for record in found}
 
     def attachments(self) -> tuple[AttachmentIndexed, ...]:

@@ -2,9 +2,12 @@
 
 from collections.abc import Callable
 from hashlib import sha256
-from typing import Protocol
+from typing import Any, Protocol
+
+import msgspec
 
 from robot.as_came import as_came
+from robot.bus.topic import Topic
 from robot.bus.topics import ARM_STATE, PERCEPT, REQUESTED, SENT, VERDICT
 from robot.errors import RobotError
 from robot.messages import (
@@ -25,7 +28,7 @@ from robot.recording.topics import EVENT, INTENT, RESET_MARK, SCENE, STATION, ST
 from robot.station import Station
 from robot.teleop.driver import DrivenStation
 
-__all__ = ["Heard", "Now", "RecordedDrive", "RecordedStation", "RecordedTicks"]
+__all__ = ["Heard", "Now", "RecordedDrive", "RecordedStation", "RecordedTicks", "Writes"]
 
 Now = Callable[[], int]
 """The session's clock."""
@@ -40,6 +43,14 @@ class Heard(Protocol):
 
     def hexdigest(self) -> str:
         """Return it so far."""
+        ...
+
+
+class Writes(Protocol):
+    """Takes messages of a session's topics."""
+
+    def write(self, topic: Topic[Any], message: msgspec.Struct, *, log_ns: int, stamp_ns: int | None = None) -> bytes:
+        """Take one, and return its payload."""
         ...
 
 
@@ -109,7 +120,7 @@ class RecordedStation:
     def __init__(
         self,
         station: Station,
-        recorder: Recorder,
+        recorder: Writes,
         *,
         purpose: Purpose,
         ticks: RecordedTicks | None = None,

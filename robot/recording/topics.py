@@ -2,6 +2,8 @@
 
 from typing import Any
 
+import msgspec
+
 from robot.bus.topic import Role, Topic
 from robot.bus.topics import ARM_STATE, PERCEPT, REQUESTED, SENT, TRUTH, VERDICT
 from robot.recording.lanes import Lane
@@ -21,7 +23,7 @@ from robot.recording.viewer_messages import FrameTransforms, SceneUpdate
 
 __all__ = [
     "EPOCH", "EVENT", "EVIDENCE", "GOAL", "INTENT", "KEPT", "LANES", "RECORDED", "RESET_MARK", "SCENE", "STATION",
-    "STEP", "SUBGOAL", "TF",
+    "STEP", "SUBGOAL", "TF", "as_on_the_bus",
 ]  # fmt: skip
 
 _ANY = tuple(Role)
@@ -45,3 +47,15 @@ RECORDED: tuple[Topic[Any], ...] = (
 LANES = {topic.name: Lane.TICKS for topic in (ARM_STATE, REQUESTED, SENT, VERDICT, TRUTH)} | {
     topic.name: Lane.VIEW for topic in (TF, SCENE)
 }
+
+
+def as_on_the_bus(topic: Topic[Any], *, is_told: bool = False) -> Topic[Any]:
+    """Return the topic that a message of the bus is recorded as: `bus/NAME` where sessions mean something else by it.
+
+    Args:
+        topic: of the bus.
+        is_told: a learner's account, with the percepts that it learns from, goes into the same file.
+    """
+    own = {recorded.name: recorded.kind for recorded in RECORDED}
+    is_other = own.get(topic.name, topic.kind) is not topic.kind or (is_told and topic.name == PERCEPT.name)
+    return msgspec.structs.replace(topic, name=f"bus/{topic.name}") if is_other else topic

@@ -26,6 +26,8 @@ START_S = 60.0
 STOP_S, NOW_S = 5.0, 1.0
 JOB_S, END_S = 30.0, 10.0
 USAGE, INTERRUPTED = 2, 130
+SPARE = "other"
+"""Kind of a process that the arm can do without."""
 
 
 class _Node:
@@ -153,8 +155,9 @@ class Supervisor:
             return
         if not node.is_silent:
             node.is_silent = True
-            self._note(node, f"silent for {SILENT_S:g} s: the arm is stopped", Worst.MENDED)
-            self._stop_arm()
+            is_needed = node.plan.kind != SPARE
+            self._note(node, f"silent for {SILENT_S:g} s{': the arm is stopped' if is_needed else ''}", Worst.MENDED)
+            self._stop_arm(node)
         if self.book.is_silent(name, for_s=GONE_S, hub=self._hub):
             self._note(node, f"silent for {GONE_S:g} s: it is killed")
             child.kill()
@@ -168,7 +171,7 @@ class Supervisor:
             self._note(node, "finished")
             return
         how = f"killed by signal {-code}" if code is not None and code < 0 else f"ended with exit code {code}"
-        self._stop_arm()
+        self._stop_arm(node)
         delay_s = None if code == USAGE else node.backoff.delay_s(self._now_s())
         if delay_s is None:
             node.is_over = True
@@ -177,8 +180,10 @@ class Supervisor:
         node.again_s = self._now_s() + delay_s
         self._note(node, f"{how} ({child.last_line}): it is started again in {delay_s:g} s", Worst.MENDED)
 
-    def _stop_arm(self) -> None:
-        """Say stop for a moment: whoever holds the arm may be what ended."""
+    def _stop_arm(self, node: _Node) -> None:
+        """Say stop for a moment, unless the arm can do without that process: whoever holds it may be what ended."""
+        if node.plan.kind == SPARE:
+            return
         self._say_stop(within_s=NOW_S, is_final=False)
 
     def _say_stop(self, *, within_s: float, is_final: bool) -> float | None:

@@ -6,6 +6,7 @@ from robot.bus import Bus, Role
 from robot.motion import AskedHand, HandReflexes
 from robot.node import RobotNode
 from robot.rigs import build_station
+from robot.tick_notes import TickNotes
 from tests.support.stations import fake_rig
 
 __all__ = ["SERIAL", "Node"]
@@ -18,7 +19,8 @@ class Node:
 
     def __init__(self, endpoint, *, is_hub=True, served=lambda station: station):
         rig = fake_rig()
-        self.local = build_station(rig)
+        notes = TickNotes(rate_hz=1.0 / rig.rig.tick_s)
+        self.local = build_station(rig, tap=notes)
         self.bus = Bus(endpoint, serial=SERIAL, role=Role.ROBOT, is_hub=is_hub)
         self.bus.open()
         self.n_halts, self.is_over = 0, threading.Event()
@@ -29,6 +31,7 @@ class Node:
             profile=rig.rig.profile,
             drive=self.drive,
             halt=self.halt,
+            take_notes=notes.take,
         )
         self.hands = {True: AskedHand(rig.arm), False: HandReflexes(arm=rig.arm, scenario=rig.scenario)}
         self.thread = threading.Thread(target=self.node.run, args=(self.is_over.is_set,))
