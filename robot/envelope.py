@@ -10,6 +10,7 @@ import numpy as np
 
 from config.arm import ArmConfig
 from config.limits import ArmPart, KeepOut, Plane, Profile
+from robot.braking import Braking
 from robot.compiled import Table, compiled
 from robot.fences import FenceGap, box_gap, keep_out_gap, plane_gap
 from robot.messages import Vec3
@@ -25,6 +26,7 @@ __all__ = [
 PARTS = (ArmPart.TCP, ArmPart.FLANGE, ArmPart.ELBOW)
 """Order of the points that chain.ToolChain.points returns."""
 FAR_M = 0.01
+BRAKING = Braking()
 N_FENCE = 9
 CONE_NEAR_RAD = 1.0
 SLOWEST_SHARE = 0.1
@@ -110,6 +112,8 @@ class Envelope(msgspec.Struct, frozen=True, kw_only=True):
             for joint, limit in zip(arm.joints, profile.joints, strict=True)
         )
         onset = max([(j.gain_rad + j.stop_rad) / (2.0 * j.stop_jerk_rad) for j in joints])
+        own_m = fastest * fastest / (2.0 * profile.stopping.deceleration_m_s2)
+        worst_m = fastest * max([j.step_rad for j in joints]) / tick_s / (2.0 * BRAKING.least_rad_s2)
         fences = [box_gap(f.name, PARTS.index(part), f.low_m, f.high_m) for f in space.boxes for part in f.parts]
         planes = [_plane(plane, part) for plane in space.planes for part in plane.parts]
         outs = [_keep_out(out, part) for out in space.keep_outs for part in out.parts]
@@ -124,9 +128,7 @@ class Envelope(msgspec.Struct, frozen=True, kw_only=True):
             fence_braking_m=braking,
             onset=onset,
             overshoot=max([0.0, *((j.gain_rad / j.stop_jerk_rad - 1.0) / 2.0 for j in joints)]),
-            fence_far_m=FAR_M
-            + onset * tick_s * fastest
-            + fastest * fastest / (2.0 * profile.stopping.deceleration_m_s2),
+            fence_far_m=FAR_M + onset * tick_s * fastest + max(own_m, worst_m),
         )
 
 

@@ -89,7 +89,13 @@ def guarded(
     onset_s = max(joint.acceleration_rad_s2 / joint.jerk_rad_s3 for joint in config.joints)
     stops, soon = (
         StopCheck(
-            config, Clearance(config, scenario, hard=kept), limits=limits, tick_s=tick_s, braking=braking, lead_s=lead_s
+            config,
+            Clearance(config, scenario, hard=kept),
+            limits=limits,
+            tick_s=tick_s,
+            braking=braking,
+            lead_s=lead_s,
+            envelope=envelope,
         )
         for kept, lead_s in ((hard, 0.0), (farther, tick_s + onset_s))
     )
@@ -341,10 +347,17 @@ class TickLoop:
         """Return what the time step that was begun last came to, and what it did on its way from the one before."""
         mover, before, self._before = self._mover, self._before, self.state
         return Stride(
-            before=before, after=self.state, is_begun=is_begun, target_m=mover.target_m, limiters=mover.limiters,
-            limited=mover.limited, is_in_contact=mover.is_in_contact, verdict=verdict, unseen=self._obstacles.unseen,
+            before=before,
+            after=self.state,
+            is_begun=is_begun,
+            target_m=mover.target_m,
+            limiters=mover.limiters,
+            limited=mover.limited,
+            is_in_contact=mover.is_in_contact,
+            verdict=verdict,
+            unseen=self._obstacles.unseen,
             sent=self._gate.sent,
-        )  # fmt: skip
+        )
 
 
 def _reason_of(error: WireError) -> Reason:

@@ -4,7 +4,6 @@ import math
 from operator import le
 
 from config.arm import ArmConfig
-from robot.chain import Points
 from robot.envelope import Envelope
 from robot.geometry import turn_about_vertical, unwound
 from robot.kinematics import Kinematics, UnreachableError
@@ -12,12 +11,19 @@ from robot.messages import Vec3, Vec6
 from robot.motion.chords import share_of_speed
 from robot.motion.free import free_bounds, is_free_step
 from robot.motion.holding import (
+    MARGIN_M,
+    OVERRUN_M,
+    REST,
     TIP,
+    TIPS,
     Met,
+    Place,
     brake_share,
+    share_at_rest,
     share_left,
     share_of_way,
     slid,
+    stops_outside,
     stretch,
     tips_too_fast,
     too_fast,
@@ -117,7 +123,7 @@ class Follower:
         """Return the tool centre point for joint angles, base frame, metres."""
         return self._kinematics.tcp(q_rad)
 
-    def points(self, q_rad: Vec6) -> tuple[tuple[Vec3, Vec3, Vec3], float]:
+    def points(self, q_rad: Vec6) -> Place:
         """Return tool centre point, flange and elbow, and how far the tool points down (chain.ToolChain)."""
         return self._kinematics.chain.points(q_rad)
 
@@ -274,9 +280,9 @@ class Follower:
         if met:
             if base is wanted:
                 base = braked(now, self.q_before_rad, self._q_earlier_rad, ends, within)
-            there = chain.points(_moved(now, base))
+            there, ends = chain.points(_moved(now, base)), (self._rest(wanted), self._rest(base))
             for limit in met:
-                left = self._left(limit, base, there)
+                left = self._left(limit, base, there, ends)
                 if left < share:
                     share, name = left, limit.name
         if share < 1.0:
@@ -288,7 +294,7 @@ class Follower:
         self._points_before, self._points = self._points[0], points
         return q
 
-    def _met(self, steps: list[float], points: tuple[tuple[Vec3, Vec3, Vec3], float]) -> list[Met]:
+    def _met(self, steps: list[float], points: Place) -> list[Met]:
         """Return the limits that steps go at too fast. Joints' ways bend: where a stop would end is looked at too."""
         now, envelope = self.q_rad, self._envelope
         fastest = max(max(steps), -min(steps))
@@ -296,20 +302,50 @@ class Follower:
             return []
         lost = brake_share(fastest, envelope)
         places = (self._points_before, self._points, points)
+        end, floor_m = self._rest(steps), self._tip_min_m
+        met = stops_outside(end, self._lowest_m(end), floor_m, self._least_m, envelope)
         if self._is_upright:
-            return too_fast(now, steps, places, None, lost, envelope)
-        end = self._kinematics.chain.points(_between(now, _moved(now, steps), stretch(lost, envelope)))
+            return met + too_fast(now, steps, places, None, lost, envelope)
         heights_m = (self._lowest_m(self._points), self._lowest_m(points), self._lowest_m(end))
-        met = tips_too_fast(heights_m, self._tip_min_m, lost, envelope)
-        return too_fast(now, steps, places, end[0], lost, envelope) + met
+        met += tips_too_fast(heights_m, floor_m, lost, envelope)
+        return met + too_fast(now, steps, places, end[0], lost, envelope)
 
-    def _left(self, limit: Met, base: list[float], there: tuple[Points, float]) -> float:
-        """Return how much of the way from a braking arm's step to the one that was wanted a limit leaves."""
+    @property
+    def _least_m(self) -> float:
+        """Least gap at which a stop ends inside of a fence."""
+        return -OVERRUN_M if self._is_upright else MARGIN_M
+
+    def _rest(self, steps: list[float]) -> Place:
+        """Return where joints come to rest that take a step and then brake together."""
+        now, fastest = self.q_rad, max(max(steps), -min(steps))
+        if fastest <= 0.0:
+            return self._points
+        far = stretch(brake_share(fastest, self._envelope), self._envelope)
+        return self._kinematics.chain.points(_between(now, _moved(now, steps), far))
+
+    def _left(self, limit: Met, base: list[float], there: Place, ends: tuple[Place, Place]) -> float:
+        """Return how much of the way from a braking arm's step to the one that was wanted a limit leaves.
+
+        Args:
+            limit: the limit.
+            base: the braking arm's step.
+            there: where it leads.
+            ends: where stops from the step that was wanted and from the braking arm's end.
+        """
+        if limit.kind == REST:
+            return share_at_rest(*(self._gap_m(limit.index, end) - self._least_m for end in ends))
         if limit.kind == TIP:
             return share_left(limit, self._lowest_m(self._points) - self._lowest_m(there))
         return share_of_way(limit, base, self._points, there, self._envelope)
 
-    def _lowest_m(self, place: tuple[Points, float]) -> float:
+    def _gap_m(self, index: int, place: Place) -> float:
+        """Return what is left of a fence, or of the fingertips' height over the table."""
+        if index == TIPS:
+            return self._lowest_m(place) - self._tip_min_m
+        fence = self._envelope.fences[index]
+        return fence.gap(place[0][fence.part])
+
+    def _lowest_m(self, place: Place) -> float:
         return self._kinematics.chain.lowest_m(place[0][0], place[1])
 
     def _go_on(self, q: Vec6, tcp_m: Vec3, *, is_braking_kept: bool = False) -> None:

@@ -11,10 +11,10 @@ import numpy as np
 from robot.chain import Points, ToolChain, chain_points, lowest_fingertip
 from robot.compiled import Table, compiled
 from robot.envelope import Envelope, braking_step
-from robot.fences import fence_gap, row_of
+from robot.fences import fence_gap, least_gap, row_of
 from robot.geometry import between
 from robot.messages import Vec3, Vec6
-from robot.motion.holding import JOINT_RESERVE, MARGIN_M, SPEED_RESERVE, braked_step
+from robot.motion.holding import JOINT_RESERVE, MARGIN_M, OVERRUN_M, SPEED_RESERVE, braked_step
 from robot.motion.pacing import RESERVE
 
 __all__ = ["Steps", "free_bounds", "is_free_step"]
@@ -123,6 +123,13 @@ def _are_tips_high(now: Place, to: Place, end: Place, bounds: Table, lost: float
 
 
 @compiled
+def _is_rest_inside(end: Place, fences: Table, bounds: Table, least_m: float) -> bool:
+    """Return whether a stop at the worst ends inside of every fence, and its fingertips over the table."""
+    lowest_m = lowest_fingertip(end[0][0], end[1], bounds[2, 3], bounds[2, 4])
+    return lowest_m - bounds[2, 5] >= least_m and least_gap(fences, end[0]) >= least_m
+
+
+@compiled
 def is_free_step(
     steps: Steps,
     before: Points,
@@ -158,11 +165,14 @@ def is_free_step(
     )
     if not is_free:
         return False, to
-    lost, end, onwards = b[2, 2] / fastest, to, 1.0
-    if not is_straight:
-        onwards = 1.0 + b[1, 5] + 0.5 / lost
-        end = chain_points(between(steps[1], steps[0], onwards), rows, tcp_m, elbow_m)
-    is_free = (is_straight or _are_tips_high(now, to, end, b, lost, onwards)) and _are_fences_far(
+    lost = b[2, 2] / fastest
+    onwards = 1.0 + b[1, 5] + 0.5 / lost
+    end = chain_points(between(steps[1], steps[0], onwards), rows, tcp_m, elbow_m)
+    if not _is_rest_inside(end, fences, b, -OVERRUN_M if is_straight else MARGIN_M):
+        return False, to
+    if is_straight:
+        return _are_fences_far(now[0], to[0], to[0], fences, b, lost, 1.0), to
+    is_free = _are_tips_high(now, to, end, b, lost, onwards) and _are_fences_far(
         now[0], to[0], end[0], fences, b, lost, onwards
     )
     return is_free, to

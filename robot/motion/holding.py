@@ -18,18 +18,24 @@ from robot.safety import Braking
 
 __all__ = [
     "MARGIN_M",
+    "OVERRUN_M",
+    "REST",
     "TIP",
+    "TIPS",
     "Met",
+    "Place",
     "Points",
     "brake_share",
     "braked_step",
     "led_out",
+    "share_at_rest",
     "share_left",
     "share_of_giving_way",
     "share_of_way",
     "share_of_way_back",
     "slid",
     "speed_step",
+    "stops_outside",
     "stretch",
     "tips_too_fast",
     "too_fast",
@@ -39,6 +45,10 @@ MARGIN_M = 5e-4
 """Motion stops this far inside of a fence, so that the gate never meets one by rounding or by a path that bows."""
 SLIDE_MARGIN_M = 1e-3
 """The tool slides along a fence at this distance, so that inverse kinematics' last digits never bring it to a stop."""
+OVERRUN_M = 2e-3
+"""So far may the end of a stop at the worst be beyond a fence that the tool slides along: its joints' ways bend."""
+TIPS = -1
+"""Number of the fence that is the table under the fingertips."""
 MARGIN_RAD = 1e-3
 RESERVE = 0.95
 """Share of a limit that motion uses, so that the gate's own is never met by rounding."""
@@ -52,7 +62,7 @@ NEAR_SPEED = 0.8
 TILT_RAD_S2 = 5.0
 """Deceleration of the tool's tilt that is counted on ahead of its cone."""
 PART_NAMES = ("tcp_speed", "flange_speed", "elbow_speed")
-JOINT, PART, FENCE, CONE, TIP = range(5)
+JOINT, PART, FENCE, CONE, TIP, REST = range(6)
 
 Points = tuple[Vec3, Vec3, Vec3]
 Place = tuple[Points, float]
@@ -75,10 +85,10 @@ class Met(msgspec.Struct, frozen=True):
 def braked_step(envelope: Envelope) -> float:
     """Return how much of the fastest joint's step is counted on to be braked off in a tick, rad.
 
-    It is no more than what the arm's own stop takes off: the gate looks at where that would end.
+    It is no more than what the arm's own stop takes off at the worst: the gate looks at where that would end.
     """
     own = BRAKE_SHARE * min([end.stop_rad for end in envelope.joints])
-    return min(own, BRAKING.deceleration_rad_s2 * envelope.tick_s * envelope.tick_s)
+    return min(own, BRAKING.least_rad_s2 * envelope.tick_s * envelope.tick_s)
 
 
 def brake_share(fastest: float, envelope: Envelope) -> float:
@@ -138,6 +148,39 @@ def share_of_way(met: Met, steps: Sequence[float], now: Place, base: Place, enve
     else:
         size = _angle(base[1]) - _angle(now[1])
     return share_left(met, size)
+
+
+def stops_outside(end: Place, lowest_m: float, tip_min_m: float, least_m: float, envelope: Envelope) -> list[Met]:
+    """Return the fences, and the table, outside of which a stop at the worst would end.
+
+    Args:
+        end: points there.
+        lowest_m: how high the lowest fingertip is there.
+        tip_min_m: how high it must stay.
+        least_m: least gap that is inside.
+        envelope: the fences.
+    """
+    met = [
+        Met(fence.name, REST, i, 0.0, 0.0)
+        for i, fence in enumerate(envelope.fences)
+        if not fence.gap(end[0][fence.part]) >= least_m
+    ]
+    return met if lowest_m - tip_min_m >= least_m else [*met, Met("table", REST, TIPS, 0.0, 0.0)]
+
+
+def share_at_rest(wanted_m: float, base_m: float) -> float:
+    """Return how much of the way leaves the end of a stop inside of a fence, 0 to 1.
+
+    An arm that took a step in between would stop in between or nearer to a braking arm's end, for what a stop takes
+    grows faster than the speed.
+
+    Args:
+        wanted_m: gap where a stop from the step that was wanted ends, less the least that is inside.
+        base_m: gap where one from the braking arm's step ends, likewise.
+    """
+    if wanted_m >= 0.0:
+        return 1.0
+    return base_m / (base_m - wanted_m) if base_m > 0.0 else 0.0
 
 
 def share_left(met: Met, size: float) -> float:

@@ -1,8 +1,12 @@
 """Whether the arm could be stopped after a command before it leaves its limits or comes too near to anything."""
 
+import numpy as np
+
 from config.arm import ArmConfig
 from robot.chain import ToolChain, chain_points, lowest_fingertip
 from robot.compiled import Table, compiled
+from robot.envelope import Envelope
+from robot.fences import least_gap
 from robot.geometry import between, difference, stepped
 from robot.messages import ArmState, Box3, Vec3, Vec6
 from robot.safety.blocks import Block
@@ -20,21 +24,25 @@ FINE_M = 0.001
 TINY_M = 1e-6
 OVERRUN_M = 0.003
 """How far a stop may overrun the fences: less than the fingertips' least height over the table."""
+HALFWAY = 0.5
+"""Of the way to a stop's end: there too an arm that goes along a fence must be inside of it, for its way bends."""
 
+NO_FENCES: Table = np.empty((0, 9))
 MOST_LOOKS = 5
 """A way that is not proved free by so many new gaps leads near to something, and is looked at closely."""
 STRIDE = 0.95
 """Of the farthest gap that is told: so far beyond what is proved the next gap is asked for."""
 
-Known = tuple[float, float]
-"""Bounds where the last command led: how far the tool is inside its fences, every joint its range."""
+Pair = tuple[float, float]
+Known = Pair
+"""Bounds where the last command led: how far all parts are inside their fences, every joint its range."""
 
 
 @compiled
 def _looked_ahead(
-    q_rad: Vec6, before_rad: Vec6, known: Known, seen: Table, far_m: Vec6, links_m: Links, law: Vec3
-) -> tuple[Known, bool, Vec6, float, Vec6, float]:
-    """Return what a command leads to when the arm is stopped after it.
+    q_rad: Vec6, before_rad: Vec6, known: Known, seen: Table, far_m: Vec6, links_m: Links, law: Pair
+) -> tuple[Known, bool, float, Vec6, float]:
+    """Return what a command leads to when the arm is stopped after it, braking at the worst.
 
     Args:
         q_rad: the command.
@@ -43,28 +51,25 @@ def _looked_ahead(
         seen: gaps that were found lately (cover).
         far_m: reaches of Sweep.
         links_m: the rest of them.
-        law: a stop turns a joint on by its step times the fastest joint's step times the first; at the worst the second
-            times as far; and before that it goes on for so many ticks.
+        law: a stop turns a joint on by its step times the fastest joint's step times the first; and before that it
+            goes on for so many ticks.
 
     Returns:
-        What is known at the command; whether a limit may be near, and where the arm comes to rest as it should; what
-        share of the way to where it comes to rest at the worst is free of bodies for sure (covered_share), where that
-        is, and how far no point of it goes until then.
+        What is known at the command; whether a limit may be near; what share of the way to where the arm comes to rest
+        is free of bodies for sure (covered_share), where that is, and how far no point of it goes until then.
     """
     step = difference(q_rad, before_rad)
     fastest = 0.0
     for s in step:
         fastest = max(fastest, abs(s))
-    stretch, weaker, lead = law
+    stretch, lead = law
     moved_m = swept_m(step, far_m, links_m)
     fence_m, range_rad = known[0] - moved_m, known[1] - fastest
     share = fastest * stretch + lead
     is_limit_near = not (fence_m > moved_m * share and range_rad > fastest * share)
-    rest = stepped(q_rad, step, share)
-    share = fastest * stretch * weaker + lead
     ahead_m, end = moved_m * share, stepped(q_rad, step, share)
     covered = covered_share(q_rad, end, ahead_m, seen, far_m, links_m)
-    return (fence_m, range_rad), is_limit_near, rest, covered, end, ahead_m
+    return (fence_m, range_rad), is_limit_near, covered, end, ahead_m
 
 
 @compiled
@@ -83,6 +88,24 @@ def _range_room(q: Vec6, low: Vec6, high: Vec6) -> float:
 
 
 @compiled
+def _room(q: Vec6, workspace_m: Box3, tips_m: Vec3, rows: Table, tool_m: tuple[Vec3, Vec3], fences: Table) -> float:
+    """Return how far all that is fenced in is inside.
+
+    Args:
+        q: joints.
+        workspace_m: where the tool centre point may be.
+        tips_m: least height of a fingertip, and ToolChain's tip and finger.
+        rows: the chain's.
+        tool_m: tool centre point and elbow of ToolChain.
+        fences: the envelope's.
+    """
+    tip_min_m, tip_m, finger_m = tips_m
+    points, down = chain_points(q, rows, tool_m[0], tool_m[1])
+    room_m = _fence_room(points[0], lowest_fingertip(points[0], down, tip_m, finger_m), workspace_m, tip_min_m)
+    return min(room_m, least_gap(fences, points))
+
+
+@compiled
 def _stayed_inside(
     q: Vec6,
     end: Vec6,
@@ -91,34 +114,35 @@ def _stayed_inside(
     tips_m: Vec3,
     rows: Table,
     tool_m: tuple[Vec3, Vec3],
+    fences: Table,
 ) -> tuple[bool, float, float]:
-    """Return whether a stop ends inside the limits, and how far inside its fences and ranges the command itself is.
+    """Return whether a stop keeps inside the limits, and how far inside its fences and ranges the command itself is.
 
     Args:
         q: the command.
         end: where the stop ends.
         range_rad: least and greatest angles.
-        workspace_m: where the tool centre point may be.
-        tips_m: least height of a fingertip, and ToolChain's tip and finger.
-        rows: the chain's.
-        tool_m: tool centre point and elbow of ToolChain.
+        workspace_m: as of _room, like all that follows.
+        tips_m: likewise.
+        rows: likewise.
+        tool_m: likewise.
+        fences: likewise.
     """
     low, high = range_rad
-    tip_min_m, tip_m, finger_m = tips_m
-    (there, _, _), down = chain_points(end, rows, tool_m[0], tool_m[1])
-    rest_m = _fence_room(there, lowest_fingertip(there, down, tip_m, finger_m), workspace_m, tip_min_m)
-    (here, _, _), down = chain_points(q, rows, tool_m[0], tool_m[1])
-    room_m = _fence_room(here, lowest_fingertip(here, down, tip_m, finger_m), workspace_m, tip_min_m)
+    rest_m = min(
+        _room(end, workspace_m, tips_m, rows, tool_m, fences),
+        _room(between(q, end, HALFWAY), workspace_m, tips_m, rows, tool_m, fences),
+    )
     is_inside = _range_room(end, low, high) >= 0.0 and rest_m >= -OVERRUN_M
-    return is_inside, room_m, _range_room(q, low, high)
+    return is_inside, _room(q, workspace_m, tips_m, rows, tool_m, fences), _range_room(q, low, high)
 
 
 class StopCheck:
     """The stopping trajectory of every command, verified. Memory: the gaps found last, and how far limits were.
 
     Nothing of the arm moves farther than the joints' turns times their reaches, so that a gap found at one posture is
-    a bound on the gaps near it, and most ticks need no evaluation, nearly all others one. Angles and workspace are
-    asked of where the arm comes to rest, bodies of the whole way there, braking at its worst.
+    a bound on the gaps near it, and most ticks need no evaluation, nearly all others one. Angles and fences are
+    asked of where the arm comes to rest, fences halfway too, bodies of the whole way there: braking at its worst.
     """
 
     def __init__(
@@ -130,6 +154,7 @@ class StopCheck:
         tick_s: float,
         braking: Braking,
         lead_s: float = 0.0,
+        envelope: Envelope | None = None,
     ) -> None:
         """Put the parts together.
 
@@ -140,18 +165,20 @@ class StopCheck:
             tick_s: how long each command holds.
             braking: how hard a stop brakes.
             lead_s: how long the arm goes on before it brakes.
+            envelope: whose fences a stop keeps inside of besides; None where there are none.
         """
         self._clearance, self._limits, self._tick_s = clearance, limits, tick_s
         self._chain = ToolChain(arm)
         self._sweep = Sweep(arm)
-        stretch = 1.0 / (2.0 * tick_s * tick_s * braking.deceleration_rad_s2)
-        self._law = (stretch, 1.0 / braking.least_share, lead_s / tick_s)
+        self._fences = () if envelope is None else envelope.fences
+        self._fence_rows = NO_FENCES if envelope is None else envelope.fence_rows
+        self._law = (1.0 / (2.0 * tick_s * tick_s * braking.least_rad_s2), lead_s / tick_s)
         self.seed()
 
     def seed(self) -> None:
         """Forget what was found: the next command is looked at afresh."""
         self._fence_m = 0.0
-        """Where the last command led the tool is so far inside its fences at least,"""
+        """Where the last command led all parts are so far inside their fences at least,"""
         self._range_rad = 0.0
         """and every joint so far inside its range."""
         self._seen, self._n_seen = nothing_seen(), 0
@@ -187,12 +214,12 @@ class StopCheck:
     def _check_step(self, q_rad: Vec6, before_rad: Vec6, from_rad: Vec6) -> Refusal | None:
         """Look at the stop of a command that is as fast as if it came from some joints in one tick."""
         sweep, known = self._sweep, (self._fence_m, self._range_rad)
-        known, is_limit_near, rest, covered, end, ahead_m = _looked_ahead(
+        known, is_limit_near, covered, end, ahead_m = _looked_ahead(
             q_rad, from_rad, known, self._seen, sweep.far_m, sweep.links_m, self._law
         )
         self._fence_m, self._range_rad = known
         if is_limit_near:
-            refusal = self._check_limits(q_rad, rest)
+            refusal = self._check_limits(q_rad, end)
             if refusal is not None:
                 return refusal
         if covered > 1.0 or self._is_free(q_rad, end, ahead_m, covered):
@@ -226,7 +253,7 @@ class StopCheck:
         low_rad, high_rad = limits.q_min_rad, limits.q_max_rad
         is_inside, self._fence_m, self._range_rad = _stayed_inside(
             q, end, (low_rad, high_rad), limits.workspace_m, (limits.tip_min_m, chain.tip_m, chain.finger_m),
-            chain.rows, (chain.tcp_m, chain.elbow_m),
+            chain.rows, (chain.tcp_m, chain.elbow_m), self._fence_rows,
         )  # fmt: skip
         if is_inside:
             return None
@@ -234,14 +261,27 @@ class StopCheck:
             return Refusal(
                 Reason.STOP_RANGE, f"expected a stop within the joints' ranges, it would end at {_round(end)}"
             )
-        tcp, lowest_m = chain.tcp_and_lowest(end)
-        low, high = limits.workspace_m
-        detail = (
-            f"expected a stop inside {low} to {high} m with the fingertips at {limits.tip_min_m:g} m or higher, "
-            f"it would end at {_round(tcp)} with them at {lowest_m:.4f}"
-        )
-        inside_m = _fence_room(tcp, lowest_m, limits.workspace_m, limits.tip_min_m)
-        return Refusal(Reason.STOP_WORKSPACE, detail, -inside_m - OVERRUN_M)
+        return self._overrun(end) or self._overrun(between(q, end, HALFWAY))
+
+    def _overrun(self, at: Vec6) -> Refusal | None:
+        """Say which fence a stop would overrun, and by how much; None where none."""
+        limits, chain = self._limits, self._chain
+        tcp, lowest_m = chain.tcp_and_lowest(at)
+        over_m = -_fence_room(tcp, lowest_m, limits.workspace_m, limits.tip_min_m) - OVERRUN_M
+        if over_m > 0.0:
+            low, high = limits.workspace_m
+            detail = (
+                f"expected a stop inside {low} to {high} m with the fingertips at {limits.tip_min_m:g} m or higher, "
+                f"it would come to {_round(tcp)} with them at {lowest_m:.4f}"
+            )
+            return Refusal(Reason.STOP_WORKSPACE, detail, over_m)
+        points = chain.points(at)[0]
+        for fence in self._fences:
+            over_m = -fence.gap(points[fence.part]) - OVERRUN_M
+            if over_m > 0.0:
+                detail = f"expected a stop inside {fence.name}, it would come {over_m + OVERRUN_M:.4f} m beyond"
+                return Refusal(Reason.STOP_WORKSPACE, detail, over_m)
+        return None
 
     def _check_way(self, q: Vec6, end: Vec6, end_gap_m: float, length_m: float, before: Vec6) -> Refusal | None:
         """Look closely: at the command and then between, until bounds meet. What is too near already may part."""

@@ -247,7 +247,7 @@ def rounded(values):
 @pytest.mark.parametrize("lead_s", [0.0, 0.02])
 def test_a_stop_out_of_range_is_told_with_where_it_would_end(i, sign, lead_s):
     step = 0.004
-    end = START[i] + sign * (step + (step / TICK_S) ** 2 / 32.0 + step * lead_s / TICK_S)
+    end = START[i] + sign * (step + (step / TICK_S) ** 2 / 16.0 + step * lead_s / TICK_S)
     name = "q_max_rad" if sign > 0 else "q_min_rad"
     for by, passes in ((1e-9, True), (-1e-9, False)):
         limit = tuple(end + sign * by if k == i else v for k, v in enumerate(getattr(LIMITS, name)))
@@ -262,8 +262,9 @@ def test_a_stop_out_of_range_is_told_with_where_it_would_end(i, sign, lead_s):
 
 @pytest.mark.parametrize(("axis", "side"), [(axis, side) for axis in range(3) for side in (0, 1)])
 def test_a_stop_out_of_the_workspace_is_told_with_where_it_would_end(axis, side):
-    step = 0.001
-    end = turned(step + (step / TICK_S) ** 2 / 32.0)
+    side_of, step = (1.0 if side else -1.0), 0.001
+    step *= 1.0 if side_of * (CHAIN.tcp(turned(step))[axis] - CHAIN.tcp(START)[axis]) >= 0.0 else -1.0
+    end = turned(step + math.copysign((step / TICK_S) ** 2 / 16.0, step))
     tcp, lowest_m = CHAIN.tcp_and_lowest(end)
     for by, passes in ((0.0029, True), (0.0031, False)):
         box = [list(corner) for corner in ((-3.0,) * 3, (3.0,) * 3)]
@@ -276,14 +277,14 @@ def test_a_stop_out_of_the_workspace_is_told_with_where_it_would_end(axis, side)
         else:
             detail = (
                 f"expected a stop inside {low} to {high} m with the fingertips at -1 m or higher, "
-                f"it would end at {rounded(tcp)} with them at {lowest_m:.4f}"
+                f"it would come to {rounded(tcp)} with them at {lowest_m:.4f}"
             )
             told(refusal, Reason.STOP_WORKSPACE, detail, 0.0001)
 
 
 def test_a_stop_whose_fingertips_would_end_too_low_is_out_of_the_workspace():
     step = 0.001
-    _, lowest_m = CHAIN.tcp_and_lowest(turned(step + (step / TICK_S) ** 2 / 32.0))
+    _, lowest_m = CHAIN.tcp_and_lowest(turned(step + (step / TICK_S) ** 2 / 16.0))
     for by, passes in ((0.0029, True), (0.0031, False)):
         check, _ = stop_check(limits=replace(LIMITS, tip_min_m=lowest_m + by))
         assert (check.check(turned(step), START, STATE) is None) is passes

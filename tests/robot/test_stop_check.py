@@ -8,6 +8,9 @@ from hypothesis import strategies as st
 from msgspec.structs import replace
 
 from config.loader import resolve
+from robot.chain import ToolChain
+from robot.envelope import Envelope
+from robot.fences import plane_gap
 from robot.hal.fake import FakeArm
 from robot.kinematics import Kinematics
 from robot.safety import Braking, Clearance, GateLimits, Hard, Reason, StopCheck
@@ -114,7 +117,7 @@ def test_far_from_everything_bodies_are_looked_at_now_and_then_only():
 @pytest.mark.parametrize(("by", "is_refused"), [(1e-9, False), (-1e-9, True)])
 def test_a_stop_may_end_at_a_joint_s_end_and_not_beyond(joint, by, is_refused):
     step = 0.004
-    end = START[joint] + step + (step / TICK_S) ** 2 / 32.0
+    end = START[joint] + step + (step / TICK_S) ** 2 / 16.0
     high = tuple(end + by if k == joint else q for k, q in enumerate(LIMITS.q_max_rad))
     check = _check(lambda turn: 1.0, limits=replace(LIMITS, q_max_rad=high))
     q = tuple(x + step * (k == joint) for k, x in enumerate(START))
@@ -128,7 +131,7 @@ def test_a_stop_may_end_at_a_joint_s_end_and_not_beyond(joint, by, is_refused):
 def test_a_stop_may_overrun_the_workspace_by_less_than_the_fingertips_clear_the_table(by_m, is_refused):
     step = 0.01
     check = _check(lambda turn: 1.0)
-    end = _turned(step + 1.0 / 32.0)
+    end = _turned(step + 1.0 / 16.0)
     y = check._chain.tcp(end)[1]
     low, high = LIMITS.workspace_m
     far = (low[0], y + 0.003 - by_m, low[2]) if y < 0 else low
@@ -138,6 +141,50 @@ def test_a_stop_may_overrun_the_workspace_by_less_than_the_fingertips_clear_the_
     assert (refusal is not None) is is_refused
     if refusal is not None:
         assert refusal.reason is Reason.STOP_WORKSPACE
+
+
+def _fenced(fences):
+    envelope = Envelope.of(RESOLVED.profile, ARM, tick_s=TICK_S)
+    return StopCheck(
+        ARM,
+        Bodies(lambda turn: 1.0),
+        limits=LIMITS,
+        tick_s=TICK_S,
+        braking=BRAKING,
+        envelope=replace(envelope, fences=fences),
+    )
+
+
+@pytest.mark.parametrize("part", range(3))
+@pytest.mark.parametrize(("by_m", "is_refused"), [(-1e-6, True), (1e-6, False)])
+def test_no_part_may_overrun_a_fence_of_the_profile_by_more_in_a_stop_at_its_worst(part, by_m, is_refused):
+    step = 0.01
+    chain = ToolChain(ARM)
+    here, end = (chain.points(_turned(by))[0][part] for by in (0.0, step + 1.0 / 16.0))
+    away = tuple(a - b for a, b in zip(here, end, strict=True))
+    far_m = math.hypot(*away)
+    normal = tuple(x / far_m for x in away)
+    offset_m = sum(n * x for n, x in zip(normal, end, strict=True)) + 0.003 - by_m
+    refusal = _fenced((plane_gap("wall", part, normal, offset_m),)).check(_turned(step), START, STATE)
+    assert (refusal is not None) is is_refused
+    if refusal is not None:
+        assert refusal.reason is Reason.STOP_WORKSPACE
+        assert "wall" in refusal.detail
+        assert refusal.amount == pytest.approx(1e-6, rel=1e-3)
+
+
+def test_a_way_that_bends_out_and_in_again_before_it_ends_is_told():
+    """Both ends of a long stop of the base are inside a wall beside the arc between them."""
+    step = 0.03
+    chain, stop_rad = ToolChain(ARM), step + 9.0 / 16.0
+    (x, y, _), (u, v, _), (a, b, _) = (chain.tcp(_turned(by)) for by in (0.0, step + stop_rad, (step + stop_rad) / 2))
+    normal = (y - v, u - x, 0.0) if (y - v) * (a - x) + (u - x) * (b - y) < 0.0 else (v - y, x - u, 0.0)
+    size = math.hypot(*normal)
+    normal = (normal[0] / size, normal[1] / size, 0.0)
+    wall = plane_gap("wall", 0, normal, normal[0] * x + normal[1] * y - 0.01)
+    assert wall.gap(chain.tcp(_turned(step))) > -0.003
+    assert wall.gap(chain.tcp(_turned(step + 9.0 / 16.0))) > -0.003
+    assert _fenced((wall,)).check(_turned(step), START, STATE).reason is Reason.STOP_WORKSPACE
 
 
 def test_a_command_that_falls_back_to_the_arm_drives_it_no_faster_than_it_goes():

@@ -120,7 +120,7 @@ def test_after_things_were_moved_bodies_are_looked_at_again():
 
 @pytest.mark.parametrize("to_end_rad", [0.0, 0.5])
 def test_a_stop_outside_the_workspace_is_told_as_that_though_a_joint_comes_near_its_end_or_to_it(to_end_rad):
-    end = stepped(HERE, difference(HERE, START), WORST / 2.0)
-    high = tuple(q + to_end_rad if k == 0 else 9.0 for k, q in enumerate(end))
+    end = stepped(HERE, difference(HERE, START), WORST)
+    high = tuple(q + to_end_rad + 1e-9 if k == 0 else 9.0 for k, q in enumerate(end))
     refusal = checked(Way(9.0, 9.0, 9.0), replace(OPEN, q_max_rad=high, tip_min_m=LOWEST_M + 0.1))[1]
     assert refusal.reason is Reason.STOP_WORKSPACE
