@@ -16,11 +16,11 @@ from learning.ended import Ended
 from learning.errors import LearningError, RunFolderError
 from learning.progress import Progress, Status
 from learning.recording import RecordWanted
-from learning.report import Run, group_runs, load_run, load_runs, report_of
+from learning.report import Run, load_run, load_runs
 from learning.report_files import write_report
 from learning.run_folder import RunFolder
 from learning.stopwatch import Stopwatch
-from learning.telling import explanation_table, profile_table, report_table, score_table, summary_lines
+from learning.telling import explanation_table, profile_table, report_tables, score_table, summary_lines
 from learning.wanted import Wanted
 from robot.stop_request import StopRequest
 
@@ -236,13 +236,11 @@ def _report_folder(runs: Sequence[Run], *, is_whole: bool) -> Path:
 
 
 def _report(runs: Sequence[Run], folder: Path, *, json: bool) -> None:
-    paths = write_report(runs, folder)
-    groups = group_runs(runs)
+    told, paths = write_report(runs, folder)
     if json:
-        typer.echo(msgspec.json.encode(report_of(groups)).decode())
+        typer.echo(msgspec.json.encode(told).decode())
         return
-    told = report_of(groups)
-    Console().print(report_table(told))
+    Console().print(*report_tables(told))
     for path, stops in told.stops:
         typer.echo(f"{path}: {stops.line()}")
     for path in paths:

@@ -14,6 +14,7 @@ from matplotlib.ticker import MaxNLocator, PercentFormatter
 from learning.report import Group, Run
 from learning.rows import EvaluationRow
 from learning.run_folder import GoalInfo
+from learning.statistics import interval_of, median_of
 
 __all__ = ["FORMATS", "Style", "curriculum_figure", "performance_figure", "save", "styles"]
 
@@ -44,6 +45,9 @@ ALIKE = 0.35
 """RGB distance below which two goals' colours are told apart by lightness."""
 WIDTHS = (2.8, 1.2)
 """Line widths of the first and the last goal: where lines coincide, the wider ones show under the narrower."""
+MANY = 8
+"""Runs from which an interval says more than the range."""
+N_BAND_DRAWS, BAND_SEED = 500, 0
 SHARE_WINDOWS = 40
 """Parts of a run that shares of goal choices are taken over, each of whole tens of epochs."""
 
@@ -96,7 +100,8 @@ def save(figure: Figure, folder: Path, name: str) -> list[Path]:
 def performance_figure(groups: Sequence[Group]) -> Figure:
     """Draw performance (top) and trials needed (bottom) by goal over epochs, a column a learner.
 
-    With several runs the line is the median and the band the range over them.
+    With several runs the line is the median and the band the range over them; from MANY runs on it is the median's 95 %
+    interval by bootstrap.
     """
     with rc_context(STYLE):
         figure = Figure(figsize=(max(6.4, 1.2 + 4.0 * len(groups)), 5.6))
@@ -106,12 +111,18 @@ def performance_figure(groups: Sequence[Group]) -> Figure:
             _draw_trials(axes[1, column], group)
             if len(groups) > 1 or len(group.runs) > 1:
                 n = len(group.runs)
-                axes[0, column].set_title(f"{group.name}, {n} run{'s' if n > 1 else ''}", loc="left")
+                axes[0, column].set_title(f"{group.name}, {_runs_of(n)}", loc="left")
         axes[0, 0].set_ylabel("test epochs achieved")
         axes[1, 0].set_ylabel("trials needed")
         handles, labels = axes[0, 0].get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside lower center", ncols=3, frameon=False, handlelength=3.6)
     return figure
+
+
+def _runs_of(n: int) -> str:
+    """Return in words how many runs are drawn, and what line and band are of them."""
+    band = "" if n == 1 else ": median, 95 % interval" if n >= MANY else ": median, range"
+    return f"{n} run{'s' if n > 1 else ''}{band}"
 
 
 def _draw_performance(axes: Axes, group: Group) -> None:
@@ -152,7 +163,7 @@ def _draw_lines(axes: Axes, group: Group, figure_of: Callable[[EvaluationRow], f
 def _over_runs(
     runs: Sequence[Run], goal: int, figure_of: Callable[[EvaluationRow], float | None]
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Return epochs, median, least and greatest over the runs; at a change of rules an epoch comes twice.  (n,) each"""
+    """Return epochs, median, and the band's ends; at a change of rules an epoch comes twice.  (n,) each"""
     values: dict[tuple[int, int], list[float]] = {}
     for run in runs:
         for row in run.evaluation_rows:
@@ -160,12 +171,22 @@ def _over_runs(
                 values.setdefault((row.epoch, row.rules_epoch), []).append(value)
     keys = sorted(values)
     table = [values[key] for key in keys]
+    ends = [_band(entry) for entry in table]
     return (
         np.array([epoch for epoch, _ in keys], dtype=float),
         np.array([np.median(entry) for entry in table]),
-        np.array([min(entry) for entry in table]),
-        np.array([max(entry) for entry in table]),
+        np.array([low for low, _ in ends]),
+        np.array([high for _, high in ends]),
     )
+
+
+def _band(values: list[float]) -> tuple[float, float]:
+    """Return least and greatest of few runs, the ends of the median's interval of many."""
+    if len(values) >= MANY:
+        interval = interval_of(values, rng=np.random.default_rng(BAND_SEED), figure=median_of, n_draws=N_BAND_DRAWS)
+        if interval is not None:
+            return interval.low, interval.high
+    return min(values), max(values)
 
 
 def _mark_changes(axes: Axes, group: Group, *, label: bool, zorder: float = 0.5) -> None:

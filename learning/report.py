@@ -1,20 +1,25 @@
 """Runs read back from their folders and put side by side: figures of merit over seeds, grouped by learner. Pure."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial
+from itertools import combinations
 from pathlib import Path
 from statistics import median
 
 import msgspec
+import numpy as np
 
 from learning.errors import RunFolderError
 from learning.metrics import EraSummary, Summary, summarise
 from learning.rows import EvaluationRow, GoalRow
 from learning.run_folder import Manifest, RunFolder
 from learning.run_search import find_runs
+from learning.statistics import Interval, interval_of, probability_of_improvement
 from learning.stops import Stops
 
 __all__ = [
+    "Comparison",
     "Count",
     "EraReport",
     "Group",
@@ -86,6 +91,8 @@ class Spread(msgspec.Struct, frozen=True, kw_only=True):
     greatest: float | None
     n: int
     of: int
+    middle: Interval | None = None
+    """Interquartile mean with its 95 % interval, where every run has a figure and there are three or more."""
 
 
 class EraReport(msgspec.Struct, frozen=True, kw_only=True):
@@ -118,10 +125,24 @@ class GroupReport(msgspec.Struct, frozen=True, kw_only=True):
     eras: tuple[EraReport, ...]
 
 
+class Comparison(msgspec.Struct, frozen=True, kw_only=True):
+    """How surely a run of one learner is better than one of another under one set of rules (0.5: as good)."""
+
+    ours: str
+    theirs: str
+    from_epoch: int
+    success: Interval | None
+    """More success of the least successful goal."""
+    trials: Interval | None
+    """Fewer trials over the optimum."""
+
+
 class Report(msgspec.Struct, frozen=True, kw_only=True):
     """What `autotelic report` writes."""
 
     groups: tuple[GroupReport, ...]
+    comparisons: tuple[Comparison, ...] = ()
+    """Of each learner with each that came after it."""
     runs: tuple[tuple[str, Summary], ...]
     """Folder and figures of each run."""
     stops: tuple[tuple[str, Stops], ...] = ()
@@ -219,11 +240,12 @@ def group_runs(runs: Sequence[Run]) -> list[Group]:
     return [Group(name=name, runs=tuple(members)) for name, members in by_name.items()]
 
 
-def report_of(groups: Sequence[Group]) -> Report:
-    """Return the figures of all groups."""
+def report_of(groups: Sequence[Group], *, rng: np.random.Generator | None = None) -> Report:
+    """Return the figures of all groups; rng draws runs anew for intervals, of which there are none without it."""
     kept = [(run.folder, run.stops) for group in groups for run in group.runs if run.stops is not None]
     return Report(
-        groups=tuple(_report_group(group) for group in groups),
+        groups=tuple(_report_group(group, rng) for group in groups),
+        comparisons=() if rng is None else tuple(_comparisons(groups, rng)),
         runs=tuple((run.folder, run.summary) for group in groups for run in group.runs),
         stops=tuple(kept),
         protective_per_1000_epochs=sum((stops for _, stops in kept), Stops()).protective_per_1000_epochs
@@ -232,34 +254,66 @@ def report_of(groups: Sequence[Group]) -> Report:
     )
 
 
-def _report_group(group: Group) -> GroupReport:
+def _eras(group: Group) -> list[list[EraSummary]]:
+    """Return the runs' figures under each set of rules, of those that came to it."""
     n_eras = max(len(run.summary.eras) for run in group.runs)
-    eras = [[run.summary.eras[i] for run in group.runs if i < len(run.summary.eras)] for i in range(n_eras)]
+    return [[run.summary.eras[i] for run in group.runs if i < len(run.summary.eras)] for i in range(n_eras)]
+
+
+def _report_group(group: Group, rng: np.random.Generator | None) -> GroupReport:
     return GroupReport(
         name=group.name,
         seeds=tuple(run.manifest.seed for run in group.runs),
-        eras=tuple(_report_era(parts) for parts in eras),
+        eras=tuple(_report_era(parts, rng) for parts in _eras(group)),
     )
 
 
-def _report_era(parts: Sequence[EraSummary]) -> EraReport:
+def _comparisons(groups: Sequence[Group], rng: np.random.Generator) -> Iterator[Comparison]:
+    for ours, theirs in combinations(groups, 2):
+        for i in range(min(len(_eras(ours)), len(_eras(theirs)))):
+            yield _compare(ours, theirs, i, rng)
+
+
+def _compare(ours: Group, theirs: Group, i: int, rng: np.random.Generator) -> Comparison:
+    """Compare two groups under their i-th sets of rules."""
+    a, b = _eras(ours)[i], _eras(theirs)[i]
+
+    def better(figure: Callable[[EraSummary], float | None]) -> Interval | None:
+        of_ours, of_theirs = ([v for part in parts if (v := figure(part)) is not None] for parts in (a, b))
+        is_whole = len(of_ours) == len(a) and len(of_theirs) == len(b)
+        return probability_of_improvement(of_ours, of_theirs, rng=rng) if is_whole else None
+
+    return Comparison(
+        ours=ours.name, theirs=theirs.name, from_epoch=a[0].from_epoch, success=better(_least_success),
+        trials=better(lambda part: None if part.trials_over_optimum is None else -part.trials_over_optimum),
+    )  # fmt: skip
+
+
+def _least_success(part: EraSummary) -> float | None:
+    return min((s for s in part.success_by_goal if s is not None), default=None)
+
+
+def _report_era(parts: Sequence[EraSummary], rng: np.random.Generator | None) -> EraReport:
+    spread = partial(_spread, parts, rng)
     has_graph = any(part.graph_wrong_last is not None for part in parts)
     return EraReport(
         from_epoch=parts[0].from_epoch,
         n_runs=len(parts),
         learnt=count(sum(part.learnt_after is not None for part in parts), len(parts)),
-        learnt_after=_spread(parts, lambda part: part.learnt_after),
+        learnt_after=spread(lambda part: part.learnt_after),
         graph_right=count(sum(part.graph_right_after is not None for part in parts), len(parts)) if has_graph else None,
-        graph_right_after=_spread(parts, lambda part: part.graph_right_after),
-        graph_wrong_later=_spread(parts, lambda part: part.graph_wrong_later),
-        trials_over_optimum=_spread(parts, lambda part: part.trials_over_optimum),
-        trials_over_optimum_worst=_spread(parts, lambda part: part.trials_over_optimum_worst),
-        trials_over_optimum_of_successes=_spread(parts, lambda part: part.trials_over_optimum_of_successes),
-        success=_spread(parts, lambda part: min((s for s in part.success_by_goal if s is not None), default=None)),
+        graph_right_after=spread(lambda part: part.graph_right_after),
+        graph_wrong_later=spread(lambda part: part.graph_wrong_later),
+        trials_over_optimum=spread(lambda part: part.trials_over_optimum),
+        trials_over_optimum_worst=spread(lambda part: part.trials_over_optimum_worst),
+        trials_over_optimum_of_successes=spread(lambda part: part.trials_over_optimum_of_successes),
+        success=spread(_least_success),
     )
 
 
-def _spread(parts: Sequence[EraSummary], figure: Callable[[EraSummary], float | None]) -> Spread:
+def _spread(
+    parts: Sequence[EraSummary], rng: np.random.Generator | None, figure: Callable[[EraSummary], float | None]
+) -> Spread:
     values = [value for part in parts if (value := figure(part)) is not None]
     return Spread(
         median=median(values) if values else None,
@@ -267,6 +321,7 @@ def _spread(parts: Sequence[EraSummary], figure: Callable[[EraSummary], float | 
         greatest=max(values, default=None),
         n=len(values),
         of=len(parts),
+        middle=interval_of(values, rng=rng) if rng is not None and len(values) == len(parts) else None,
     )
 
 

@@ -4,20 +4,26 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import msgspec
+import numpy as np
 
 from learning.figures import curriculum_figure, performance_figure, save
-from learning.report import Run, group_runs, report_of
+from learning.report import Report, Run, group_runs, report_of
 
 __all__ = ["write_report"]
 
 
-def write_report(runs: Sequence[Run], folder: Path) -> list[Path]:
-    """Draw the figures of runs, write them and their figures of merit, and return the files."""
+DRAWS_SEED = 0
+"""Of the runs that are drawn anew for intervals: the same runs give the same report."""
+
+
+def write_report(runs: Sequence[Run], folder: Path) -> tuple[Report, list[Path]]:
+    """Draw the figures of runs, write them and their figures of merit, and return those and the files."""
     groups = group_runs(runs)
+    report = report_of(groups, rng=np.random.default_rng(DRAWS_SEED))
     paths = [
         *save(performance_figure(groups), folder, "figure2"),
         *save(curriculum_figure(groups), folder, "curriculum"),
         folder / "summary.json",
     ]
-    paths[-1].write_bytes(msgspec.json.format(msgspec.json.encode(report_of(groups)), indent=2) + b"\n")
-    return paths
+    paths[-1].write_bytes(msgspec.json.format(msgspec.json.encode(report), indent=2) + b"\n")
+    return report, paths

@@ -11,9 +11,10 @@ from learning.metrics import EraSummary
 from learning.progress import duration_text
 from learning.report import Count, Report, Run, Spread
 from learning.rows import EvaluationRow
+from learning.statistics import Interval
 from learning.time_spent import TimeSpent
 
-__all__ = ["explanation_table", "profile_table", "report_table", "score_table", "summary_lines"]
+__all__ = ["explanation_table", "profile_table", "report_table", "report_tables", "score_table", "summary_lines"]
 
 
 def summary_lines(run: Run) -> Iterator[str]:
@@ -51,6 +52,8 @@ def _era_line(era: EraSummary, *, is_first: bool) -> str:
 def report_table(report: Report) -> Table:
     """Return a table of all groups and sets of rules: how many learnt over its 95 % interval, median over range.
 
+    Of three runs and more the interquartile mean follows, with its 95 % interval in brackets.
+
     Where not every run of a group has a figure, or came to a set of rules, the cell says how many did.
     """
     table = Table(
@@ -75,6 +78,24 @@ def report_table(report: Report) -> Table:
                 _spread(era.success, "{:.0%}"),
                 end_section=True,
             )
+    return table
+
+
+def report_tables(report: Report) -> list[Table]:
+    """Return the table of all groups and, where there are intervals, one of how they compare."""
+    is_compared = any(c.success is not None or c.trials is not None for c in report.comparisons)
+    return [report_table(report), *([_comparison_table(report)] if is_compared else [])]
+
+
+def _comparison_table(report: Report) -> Table:
+    """Return how surely each learner is better than each that came after it."""
+    table = Table(
+        "a run of", "against one of", "rules\nfrom", "has more success", "needs fewer trials", box=box.SIMPLE_HEAD,
+        pad_edge=False, caption="probability with its 95 % interval; 50 %: as good",
+    )  # fmt: skip
+    for row in report.comparisons:
+        cells = ("–" if x is None else _interval(x, "{:.0%}") for x in (row.success, row.trials))
+        table.add_row(Text(row.ours), Text(row.theirs), str(row.from_epoch), *cells)
     return table
 
 
@@ -157,7 +178,13 @@ def _spread(spread: Spread, form: str) -> str:
     middle = form.format(spread.median)
     if spread.n == 1:
         return f"{middle}{few}"
-    return f"{middle}\n{form.format(spread.least).removesuffix('%')}–{form.format(spread.greatest)}{few}"
+    between = "" if spread.middle is None else f"\n{_interval(spread.middle, form)}"
+    return f"{middle}\n{form.format(spread.least).removesuffix('%')}–{form.format(spread.greatest)}{few}{between}"
+
+
+def _interval(interval: Interval, form: str) -> str:
+    value, low, high = (form.format(x) for x in (interval.value, interval.low, interval.high))
+    return f"{value} [{low.removesuffix('%')}, {high}]"
 
 
 def _share_of_runs(n: int, of: int) -> str:

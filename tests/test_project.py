@@ -22,9 +22,9 @@ EDGES = {
     "agent", "assembly", "assess", "bench", "checkpoint", "cli", "consent", "demonstrations", "ended", "errors",
     "evaluation", "evaluation_pool", "experiment", "explain", "figures", "fingerprint", "goals", "metrics",
     "offline", "preceding", "progress", "provenance", "recorded", "recording", "replaying", "report",
-    "report_files", "robot_hours", "rows", "run_folder", "run_search", "seeds", "session", "session_bench", "stops",
-    "stopwatch", "sweeping.cells", "sweeping.cli", "sweeping.executor", "sweeping.local", "sweeping.manifest",
-    "sweeping.runner", "sweeping.table", "tables", "telling", "time_spent", "wanted", "wired",
+    "report_files", "robot_hours", "rows", "run_folder", "run_search", "seeds", "session", "session_bench",
+    "statistics", "stops", "stopwatch", "sweeping.cells", "sweeping.cli", "sweeping.executor", "sweeping.local",
+    "sweeping.manifest", "sweeping.runner", "sweeping.table", "tables", "telling", "time_spent", "wanted", "wired",
 }  # fmt: skip
 """Modules of learning that hold nothing learnt: what runs the learner, judges it, keeps it or tells of it."""
 OWN_KEYS = {"config.learning", "config.values"}

@@ -15,7 +15,7 @@ from config.errors import ConfigError
 from config.loader import load_learning, load_rig, load_sweep, resolve
 from config.sweep import Sweep
 from learning.errors import LearningError, RunFolderError
-from learning.report import Run, group_runs, load_run, report_of
+from learning.report import Run, load_run
 from learning.report_files import write_report
 from learning.run_folder import RunFolder
 from learning.sweeping.cells import is_finished
@@ -24,7 +24,7 @@ from learning.sweeping.local import LocalExecutor
 from learning.sweeping.manifest import take_folder
 from learning.sweeping.runner import SweepRunner
 from learning.sweeping.table import Pace, sweep_table
-from learning.telling import report_table
+from learning.telling import report_tables
 from robot.stop_request import StopRequest
 
 __all__ = ["sweep"]
@@ -120,11 +120,10 @@ def _named(run: Run, name: str) -> Run:
 
 
 def _merge(runs: list[Run], runner: SweepRunner, *, json: bool) -> None:
-    report = report_of(group_runs(runs))
-    paths = write_report(runs, runner.folder / "report")
+    report, paths = write_report(runs, runner.folder / "report")
     if json:
         typer.echo(msgspec.json.encode(report).decode())
         return
-    Console().print(report_table(report))
+    Console().print(*report_tables(report))
     for path in paths:
         typer.echo(path)

@@ -5,6 +5,7 @@ import json
 import math
 
 import msgspec
+import numpy as np
 import pytest
 from rich.console import Console
 
@@ -12,7 +13,8 @@ from learning.bench import learning_results
 from learning.errors import RunFolderError
 from learning.figures import curriculum_figure, performance_figure, save, styles
 from learning.report import Report, count, group_runs, load_run, load_runs, report_of
-from learning.telling import report_table, summary_lines
+from learning.statistics import Interval
+from learning.telling import report_table, report_tables, summary_lines
 from tests.support.toy_folder import make_started_toy_folder, make_toy_folder, toy_manifest
 
 
@@ -136,12 +138,19 @@ def test_a_figure_of_fewer_than_all_runs_says_of_how_many_in_table_and_json(runs
     )
     report = report_of(group_runs([first, second, third]))
     told = json.loads(msgspec.json.encode(report))["groups"][0]["eras"][0]
-    assert told["graph_right_after"] == {"median": 20.0, "least": 10, "greatest": 30, "n": 2, "of": 3}
+    assert told["graph_right_after"] == {"median": 20.0, "least": 10, "greatest": 30, "n": 2, "of": 3, "middle": None}
     assert (told["graph_right"]["n"], told["graph_right"]["of"], told["learnt_after"]["n"]) == (2, 3, 3)
     assert (cells(report, "graph")[0], cells(report, "after")[0]) == ("20\n10–30\n2 of 3\nruns", "20\n20–20")
     never = report_of(group_runs([with_era(run, 0, graph_right_after=None) for run in (first, second, third)]))
     told = json.loads(msgspec.json.encode(never))["groups"][0]["eras"][0]
-    assert told["graph_right_after"] == {"median": None, "least": None, "greatest": None, "n": 0, "of": 3}
+    assert told["graph_right_after"] == {
+        "median": None,
+        "least": None,
+        "greatest": None,
+        "n": 0,
+        "of": 3,
+        "middle": None,
+    }
     assert cells(never, "graph")[0] == "–\n0 of 3\nruns"
     slow = report_of(group_runs([first, second, with_era(third, 0, graph_right_after=40, learnt_after=None)]))
     assert (cells(slow, "graph")[0], cells(slow, "after")[0]) == ("30\n10–40", "20\n20–20\n2 of 3\nruns")
@@ -241,3 +250,33 @@ def test_bench_rows_ask_the_goal_of_the_worst_run(runs):
     row = {row.name: row for row in learning_results(never)}["graph_right_after_epochs"]
     assert (row.value, row.ok, row.details) == (30, False, {"over": "2 of 3"})
     assert math.isnan({row.name: row for row in learning_results([])}["epoch_all_goals"].value)
+
+
+def test_three_runs_have_interquartile_means_with_intervals_and_two_learners_a_probability(runs):
+    ours = [with_era(run, 0, trials_over_optimum=0.1 * i) for i, run in enumerate([runs[0]] * 3)]
+    theirs = [
+        with_manifest(with_era(run, 0, trials_over_optimum=1.0 + i), learner="slow")
+        for i, run in enumerate([runs[0]] * 4)
+    ]
+    report = report_of(group_runs([*ours, *theirs]), rng=np.random.default_rng(0))
+    middle = report.groups[0].eras[0].trials_over_optimum.middle
+    assert middle.value == pytest.approx(0.1)
+    assert 0.0 <= middle.low < middle.value < middle.high <= 0.2 + 1e-9
+    assert (report.comparisons[0].ours, report.comparisons[0].theirs) == ("toy", "slow")
+    assert report.comparisons[0].trials == Interval(value=1.0, low=1.0, high=1.0)
+    assert report.comparisons[0].success.value == 0.5
+    text = io.StringIO()
+    Console(file=text, width=200).print(*report_tables(report))
+    assert "0.10 [" in text.getvalue()
+    assert "needs fewer trials" in text.getvalue()
+    assert "100% [100, 100%]" in text.getvalue()
+
+
+def test_what_not_every_run_has_and_what_two_runs_have_gets_no_interval(runs):
+    three = [runs[0], runs[0], with_era(runs[0], 0, learnt_after=None)]
+    era = report_of(group_runs(three), rng=np.random.default_rng(0)).groups[0].eras[0]
+    assert era.learnt_after.middle is None
+    assert era.trials_over_optimum.middle is not None
+    two = report_of(group_runs(runs[:2]), rng=np.random.default_rng(0))
+    assert two.groups[0].eras[0].trials_over_optimum.middle is None
+    assert len(report_tables(two)) == 1
