@@ -1,11 +1,11 @@
 """Control experiments: which ones a revision calls for, when they are done, and that they are not lost."""
 
 from config.learning import SubgoalSelection
+from learning.abstract.rules import needs
 from learning.controls import Controls, probe_of, violations
 from learning.graph import Graph
 from learning.interfaces import Attempt, TrialOutcome
 from learning.preconditions import Needs, Situation
-from tests.support.abstract_table import needs
 
 N = 4
 

@@ -5,11 +5,11 @@ import pytest
 
 from config.learning import SubgoalSelection
 from learning import curiosity
+from learning.abstract.rules import needs
 from learning.curiosity import Curiosity
 from learning.graph import Graph
 from learning.interfaces import Attempt, TrialOutcome
 from learning.preconditions import START
-from tests.support.abstract_table import needs
 
 N = 4
 

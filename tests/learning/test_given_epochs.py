@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from config.learning import Experiment, SubgoalSelection
+from learning.abstract.rules import needs
 from learning.agent import Agent
 from learning.interfaces import Attempt, TrialOutcome
 from learning.subgoal_graph import GraphSelector
-from tests.support.abstract_table import needs
 from tests.support.toy_learner import N_GOALS, ToyExperts, ToyGoalSelector, ToyJudge, ToyStation
 
 ACHIEVED, BLOCKED = TrialOutcome.ACHIEVED, TrialOutcome.BLOCKED

@@ -5,9 +5,10 @@ from itertools import permutations
 import numpy as np
 import pytest
 
+from learning.abstract.rules import draw_rules, needs, optimal_trials
 from learning.planning import Effort, cheapest_plan, relevant_goals
 from learning.preconditions import START, Situation
-from tests.support.abstract_table import PAPER_AFTER, PAPER_BEFORE, draw_rules, needs, optimal_trials
+from tests.support.abstract_table import PAPER_AFTER, PAPER_BEFORE
 
 
 def effort(n, trials=None, losses=None):

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from config.learning import SubgoalSelection
+from learning.abstract.rules import needs
 from learning.checkpoint import decode, encode
 from learning.curiosity import most_hopeful_step
 from learning.explain import explain_graph
@@ -13,7 +14,6 @@ from learning.graph import Graph
 from learning.interfaces import Attempt, TrialOutcome
 from learning.preconditions import START, Needs, Situation, conjunctions
 from learning.subgoal_graph import GraphSelector
-from tests.support.abstract_table import needs
 
 ACHIEVED, BLOCKED, NOT_REACHED = TrialOutcome.ACHIEVED, TrialOutcome.BLOCKED, TrialOutcome.NOT_REACHED
 N = 4

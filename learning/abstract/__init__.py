@@ -1,0 +1,1 @@
+"""The upper layers' science without physics: skills are chances of success."""

@@ -1,0 +1,126 @@
+"""The paper's protocol without physics, any number of switches, in the project's words: mastered, learnt, right."""
+
+from collections.abc import Sequence
+from itertools import pairwise
+from statistics import fmean
+
+import msgspec
+import numpy as np
+
+from config.learning import LearningConfig
+from learning.abstract.learner import AbstractLearner
+from learning.abstract.rules import TRIALS, Rules, optimal_trials, reachable_states, situation
+from learning.abstract.table import AbstractTable, Skills, Things
+from learning.interfaces import SubgoalSelector
+from learning.subgoal_graph import GraphSelector
+
+__all__ = ["Era", "Result", "is_graph_right", "run_abstract"]
+
+DENSE_EVERY, DENSE_FOR, EVERY = 10, 150, 50
+"""How judged runs evaluate."""
+N_TESTS, N_ENOUGH = 20, 18
+LOOK_EVERY = 10
+"""Epochs between looks at the graph."""
+N_LAST = 200
+
+
+class Era(msgspec.Struct, frozen=True, kw_only=True):
+    """What the span under one set of rules came to; epochs are counted from its beginning."""
+
+    mastered: int | None
+    """First of two evaluations running at which every goal was achieved in 18 of 20 test epochs."""
+    right: int | None
+    """Epoch from which the graph was right and stayed so until the era's end, as far as it was looked at."""
+    over_optimum: float
+    """Trials over the optimum, mean over goals of the mean over their learning epochs, the last 200 of the era."""
+    success: float
+    """Share of learning epochs achieved, the last 200."""
+    goals: tuple[int, ...]
+    """Goal of each epoch."""
+    least_success: float
+    """Of the least successful goal, the last 200 epochs; 1 where no goal was chosen."""
+
+
+class Result(msgspec.Struct, frozen=True, kw_only=True):
+    """What one run came to, era by era."""
+
+    eras: tuple[Era, ...]
+    table: AbstractTable
+    learner: AbstractLearner
+
+
+def run_abstract(
+    *,
+    seed: int,
+    config: LearningConfig,
+    eras: Sequence[Rules],
+    epochs: int = 1000,
+    skills: Skills | None = None,
+    things: Things | None = None,
+) -> Result:
+    """Learn for so many epochs under each set of rules and measure as judged runs are."""
+    first, second = np.random.default_rng(seed).spawn(2)
+    n_goals = len(eras[0])
+    table = AbstractTable(n_goals=n_goals, skills=skills or Skills(), rng=first, things=things)
+    learner = AbstractLearner(
+        n_goals=n_goals, goals=config.goal_selection, subgoals=config.subgoal_selection, rng=second
+    )
+    ended = [_run_era(table, learner, rules, n_before=i * epochs, epochs=epochs) for i, rules in enumerate(eras)]
+    return Result(eras=tuple(ended), table=table, learner=learner)
+
+
+class _Evaluations:
+    """Whether all goals are mastered, evaluation by evaluation, until they are twice running."""
+
+    def __init__(self) -> None:
+        self._at: list[tuple[int, bool]] = []
+
+    @property
+    def mastered(self) -> int | None:
+        return next((epoch for (epoch, is_one), (_, is_next) in pairwise(self._at) if is_one and is_next), None)
+
+    def look(self, i: int, table: AbstractTable, learner: AbstractLearner, epoch: int) -> None:
+        if i % (DENSE_EVERY if i <= DENSE_FOR else EVERY) == 0 and self.mastered is None:
+            self._at.append((i, _all_mastered(table, learner, epoch)))
+
+
+def _run_era(table: AbstractTable, learner: AbstractLearner, rules: Rules, *, n_before: int, epochs: int) -> Era:
+    table.rules = rules
+    rows: list[tuple[int, bool, int]] = []
+    evaluations, wrong_until = _Evaluations(), 0
+    has_graph = isinstance(learner.selector, GraphSelector)
+    for i in range(1, epochs + 1):
+        rows.append(learner.learn_epoch(table, n_before + i))
+        evaluations.look(i, table, learner, n_before + i)
+        if has_graph and i % LOOK_EVERY == 0 and not is_graph_right(learner.selector, rules):
+            wrong_until = i
+    last, optimum = rows[-N_LAST:], optimal_trials(rules)
+    by_goal = [[(ok, n - optimum[goal]) for chosen, ok, n in last if chosen == goal] for goal in range(len(rules))]
+    return Era(
+        mastered=evaluations.mastered,
+        right=wrong_until + LOOK_EVERY if has_graph and wrong_until < epochs else None,
+        over_optimum=fmean(fmean(n for _, n in row) if row else 0.0 for row in by_goal),
+        success=fmean(ok for _, ok, _ in last),
+        least_success=min(fmean(ok for ok, _ in row) for row in by_goal if row),
+        goals=tuple(goal for goal, _, _ in rows),
+    )
+
+
+def _all_mastered(table: AbstractTable, learner: AbstractLearner, epoch: int) -> bool:
+    """Whether every goal that can be achieved is, often enough, learning off."""
+    optimum = optimal_trials(table.rules)
+    return all(
+        sum(learner.test_epoch(table, epoch, goal)[0] for _ in range(N_TESTS)) >= N_ENOUGH
+        for goal in range(learner.n_goals)
+        if optimum[goal] < TRIALS
+    )
+
+
+def is_graph_right(selector: SubgoalSelector, rules: Rules) -> bool:
+    """Whether the graph says the same as the rules of every goal in every goal-state that can be reached."""
+    assert isinstance(selector, GraphSelector)
+    return all(
+        (selector.graph.beliefs[g].predict_allowed(situation(state)) > 0.5) == rules[g].allow(situation(state))
+        for state in reachable_states(rules)
+        for g in range(len(rules))
+    )

@@ -1,0 +1,73 @@
+"""Rules of a table without physics: what each goal needs, which goal-states can come about, the fewest trials. Pure."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from learning.interfaces import GoalState
+from learning.planning import Effort, cheapest_plan
+from learning.preconditions import START, Needs, Situation
+
+__all__ = ["TRIALS", "Rules", "bits", "draw_rules", "needs", "optimal_trials", "reachable_states", "situation"]
+
+Rules = tuple[Needs, ...]
+TRIALS = 8
+"""That an epoch has."""
+ON_SHARE = 0.6
+"""Of the literals that are drawn, those that ask for a goal and not against it."""
+ROOM = 3
+"""Trials that a drawn goal leaves over at least."""
+
+
+def needs(on: Sequence[int] = (), off: Sequence[int] = ()) -> Needs:
+    """Return a conjunction from goal indices."""
+    return Needs(sum(1 << i for i in on), sum(1 << i for i in off))
+
+
+def reachable_states(rules: Rules) -> set[int]:
+    """Return every goal-state that can come about from the empty one."""
+    found, frontier = {0}, [0]
+    while frontier:
+        state = frontier.pop()
+        for g, needed in enumerate(rules):
+            there = state | 1 << g
+            if needed.allow(situation(state)) and there not in found:
+                found.add(there)
+                frontier.append(there)
+    return found
+
+
+def optimal_trials(rules: Rules) -> tuple[int, ...]:
+    """Return the fewest trials that each goal takes from the empty goal-state."""
+    plans = [cheapest_plan(g, START, rules.__getitem__, _effort(len(rules))) for g in range(len(rules))]
+    return tuple(len(plan) if plan else TRIALS for plan in plans)
+
+
+def draw_rules(rng: np.random.Generator, n_goals: int, *, max_literals: int = 3) -> Rules:
+    """Draw needs of up to so many literals, on and off, such that every goal can be achieved within the trials."""
+    while True:
+        rules = tuple(_draw_needs(rng, g, n_goals, max_literals) for g in range(n_goals))
+        plans = [cheapest_plan(g, START, rules.__getitem__, _effort(n_goals)) for g in range(n_goals)]
+        if all(plan and len(plan) <= TRIALS - ROOM for plan in plans):
+            return rules
+
+
+def _effort(n_goals: int) -> Effort:
+    return Effort(trials=[1.0] * n_goals, losses=[[0.0] * n_goals] * n_goals)
+
+
+def _draw_needs(rng: np.random.Generator, goal: int, n_goals: int, max_literals: int) -> Needs:
+    others = [i for i in range(n_goals) if i != goal]
+    members = rng.choice(others, size=int(rng.integers(0, max_literals + 1)), replace=False)
+    is_on = rng.random(len(members)) < ON_SHARE
+    return needs([int(i) for i in members[is_on]], [int(i) for i in members[~is_on]])
+
+
+def situation(state: int) -> Situation:
+    """Return a goal-state as what a plan starts from."""
+    return Situation(state, state)
+
+
+def bits(state: GoalState) -> int:
+    """Return a goal-state as a bit mask."""
+    return sum(1 << i for i, is_on in enumerate(state) if is_on)
