@@ -196,7 +196,7 @@ def test_captured_commands_sent_again_move_nothing(engaged, viewer, node):
     )
     for _ in range(5):
         engaged.step(GO)
-    until(lambda: len(captured) == 5)
+    until(lambda: len(captured) >= 5)
     spy.undeclare()
     before, n_before = node.local.measured, node.node._admission.n_refused
     key = key_of(SERIAL, INTENT.name)
