@@ -141,9 +141,8 @@ class ServoClient:
         self._taking.wait()
         ours, theirs = self._context.Pipe()
         pulse = self._context.RawArray("q", 1)
-        process = self._context.Process(
-            target=serve, args=(theirs, self._resolved_json, pulse, self._halt), daemon=True
-        )
+        shared = (pulse, self._halt, self._taking.uploaded)
+        process = self._context.Process(target=serve, args=(theirs, self._resolved_json, *shared), daemon=True)
         process.start()
         theirs.close()
         self._process, self._connection = process, ours

@@ -19,7 +19,9 @@ import os
 import signal
 import sys
 from collections.abc import Callable, MutableSequence, Sequence
+from functools import partial
 from multiprocessing.connection import Connection
+from operator import setitem
 from time import monotonic_ns
 
 import msgspec
@@ -80,7 +82,11 @@ NOT_TICKING = 0
 
 
 def serve(
-    connection: Connection, resolved_json: bytes, pulse: MutableSequence[int], halt: MutableSequence[int]
+    connection: Connection,
+    resolved_json: bytes,
+    pulse: MutableSequence[int],
+    halt: MutableSequence[int],
+    uploaded: MutableSequence[int],
 ) -> None:
     """Run a servo process until its station lets go of it.
 
@@ -89,6 +95,7 @@ def serve(
         resolved_json: everything the rig is made of.
         pulse: shared memory of one number: ticks so far while it ticks, otherwise 0.
         halt: shared memory of one number: other than 0 once somebody said stop.
+        uploaded: shared memory of one number: 1 from before anything of this process's may run on the arm.
 
     SIGTERM stops the arm and ends it too. It does not return: ruckig's binding would tell of some thirty leaks at the
     interpreter's end, over what a person is to read.
@@ -110,6 +117,7 @@ def serve(
 
     if isinstance(plant, Linked):
         plant.end_by(die)
+        plant.tell_upload(partial(setitem, uploaded, 0, 1))
 
     def latched(verdict: Verdict) -> None:
         server.latched(verdict)

@@ -1,7 +1,8 @@
 """What goes on around the word that has a servo process take command: who listens meanwhile, and what a loss leaves."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, MutableSequence
 from contextlib import contextmanager
+from multiprocessing import get_context
 from multiprocessing.connection import Connection, wait
 
 from robot.errors import RobotError, StaleStateError
@@ -10,6 +11,7 @@ from robot.hal.taking_watch import TakingWatch
 
 __all__ = ["Taking", "has_come"]
 
+NOTHING_SENT = "it was lost before anything was sent to the arm: what runs there is somebody else's"
 WHILE_TAKING = (
     "it was lost while it took command, when no watchdog may have been armed yet: a program that it left is ended as "
     "soon as the controller can be reached, for 2 s; after that look at the pendant"
@@ -21,15 +23,21 @@ class Taking:
 
     Args:
         address: host of the controller; None for an arm without one, which takes no watching.
+
+    Attributes:
+        uploaded: Shared memory of one number, 1 once the process has begun to upload a program.
     """
 
     def __init__(self, address: str | None) -> None:
         self._address = address
+        self.uploaded: MutableSequence[int] = get_context("spawn").RawArray("q", 1)
         self._leftover = None if address is None else Leftover(address)
 
     @contextmanager
     def watched(self, *, end: Callable[[], object], is_gone: Callable[[], bool]) -> Iterator[int | None]:
         """Listen to the controller while a process takes command; what one that was lost left on the arm is ended.
+
+        What runs on the arm when a process is lost that has not begun to upload is somebody else's, and is left alone.
 
         Gives a descriptor that can be read once `end` was called; None where nobody listens.
 
@@ -40,6 +48,7 @@ class Taking:
         Raises:
             RobotError: what was raised inside, with what was seen of a loss; or nobody answers at the address.
         """
+        self.uploaded[0] = 0
         if self._address is None or self._leftover is None:
             yield None
             return
@@ -50,6 +59,8 @@ class Taking:
         except RobotError as error:
             if not is_gone():
                 raise
+            if not self.uploaded[0]:
+                raise type(error)(f"{watch.why or error}; {NOTHING_SENT}") from error
             self._leftover.begin()
             raise type(error)(f"{watch.why or error}; {WHILE_TAKING}") from error
 

@@ -138,3 +138,7 @@ class Linked(Protocol):
     def abandon(self) -> None:
         """Stop what may still be spoken to, before this process ends. From any thread; never raises."""
         ...
+
+    def tell_upload(self, tell: Callable[[], object]) -> None:
+        """Have `tell` called before the first thing is sent that the arm would run."""
+        ...

@@ -116,6 +116,7 @@ class RtdeCommand:
         return is_ended
 
     def _connected(self) -> RTDEControlInterface:
+        self._links.when_uploading()
         with self._in_time():
             control = RTDEControlInterface(self._address, RATE_HZ, RTDEControlInterface.FLAG_UPLOAD_SCRIPT)
         self._links.look()

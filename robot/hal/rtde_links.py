@@ -20,6 +20,7 @@ class RtdeLinks:
         is_lost: A link was cut, or the controller fell silent.
         when_lost: Called from a thread once that happens while nobody ticks; ends this process. None where it may not
             end: then the client goes on by itself.
+        when_uploading: Called before a client uploads its program; until then nothing on the arm is ours.
     """
 
     def __init__(self, address: str) -> None:
@@ -27,6 +28,7 @@ class RtdeLinks:
         self._guard: LinkGuard | None = None
         self.is_lost = False
         self.when_lost: Callable[[], object] | None = None
+        self.when_uploading: Callable[[], object] = lambda: None
 
     @property
     def is_lost_now(self) -> bool:

@@ -61,6 +61,10 @@ class RtdePlant:
         """Stop the fingers, before this process ends."""
         self.arm.abandon()
 
+    def tell_upload(self, tell: Callable[[], object]) -> None:
+        """Have this called before a program is uploaded."""
+        self.arm.links.when_uploading = tell
+
     def observer(self) -> UrObserver:
         """Return somebody who looks at the arm by clients that cannot move it."""
         return UrObserver(arm=self._config, address=self._address, serial=self._serial, pins=Pins(self._cell))

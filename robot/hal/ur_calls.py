@@ -9,6 +9,14 @@ from robot.errors import WireError
 
 __all__ = ["bounded", "named"]
 
+HINTS = (
+    ("start control script", "is it in remote control, and do its ports 30001 to 30003 answer?"),
+    ("host not found", "is the address right? a name must be known to this machine, numbers always are"),
+    ("refused", "is it up, and is that service enabled on the pendant (Settings, Security, Services)?"),
+)
+"""What to try, by what the client says."""
+TRY_ELSE = "is it up and its address right, does it answer a ping, and is that service enabled on the pendant?"
+
 
 @contextmanager
 def named(what: str, address: str) -> Iterator[None]:
@@ -20,7 +28,9 @@ def named(what: str, address: str) -> Iterator[None]:
     try:
         yield
     except RuntimeError as error:
-        raise WireError(f"{what}: expected an answer at {address}, got: {error}") from error
+        said = str(error)
+        hint = next((hint for words, hint in HINTS if words in said.lower()), TRY_ELSE)
+        raise WireError(f"{what}: expected an answer at {address}, got: {said.rstrip('. ')}; {hint}") from error
 
 
 @contextmanager

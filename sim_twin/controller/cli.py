@@ -110,9 +110,17 @@ def fault(
 
 
 def _argument(text: str) -> tuple[str, object]:
+    """Return a name and what JSON makes of its value; a plain word is itself, for a shell eats its quotes."""
     import msgspec
 
     key, sign, value = text.partition("=")
     if not sign:
         raise ValueError(f"expected name=value, got {text!r}")
-    return key, msgspec.json.decode(value)
+    try:
+        return key, msgspec.json.decode(value)
+    except msgspec.DecodeError as error:
+        if value.isidentifier():
+            return key, value
+        raise ValueError(
+            f"{key}: expected a number, true, false, a list in brackets or a word, got {value!r} ({error})"
+        ) from error

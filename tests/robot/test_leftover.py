@@ -3,9 +3,13 @@
 import socket
 from time import monotonic, sleep
 
+import msgspec
 import pytest
 
+from config.loader import resolve
+from robot.errors import RobotError
 from robot.hal.leftover import Leftover
+from robot.servo_client import ServoClient
 from sim_twin.controller.process import ControllerProcess, ask_fault
 from sim_twin.controller.server import Setup
 from tests.support.loopback import own_address
@@ -66,3 +70,21 @@ def test_where_nobody_answers_it_gives_up_in_time():
     leftover.begin()
     assert not leftover.wait()
     assert monotonic() - begun_s < 5.0
+
+
+@pytest.mark.parametrize("port", [30004, 29999])
+def test_who_loses_the_arm_before_uploading_leaves_somebody_elses_program_alone(host, port):
+    resolved = resolve(rig="virtual_lab")
+    rig = msgspec.structs.replace(resolved.rig, address=host, bus=None)
+    client = ServoClient(msgspec.structs.replace(resolved, rig=rig))
+    try:
+        client.connect()
+        ask_fault(host, "drop", port=port)
+        play(host)
+        with pytest.raises(RobotError):
+            client.engage()
+        sleep(1.0)
+        assert runtime(host) == "PLAYING"
+    finally:
+        client.close()
+    assert runtime(host) == "PLAYING"

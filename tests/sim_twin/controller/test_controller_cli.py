@@ -92,7 +92,8 @@ def test_faults_come_by_the_command_line(process):
     assert result.exit_code == 0, result.output
     assert process.fault("truth")["safety_mode"] == "PROTECTIVE_STOP"
     assert CliRunner().invoke(app, ["fault", HOST, "nonsense"]).exit_code == 1
-    assert CliRunner().invoke(app, ["fault", HOST, "delay", "ms=x"]).exit_code == 2
+    assert CliRunner().invoke(app, ["fault", HOST, "delay", "ms=x"]).exit_code == 1
+    assert CliRunner().invoke(app, ["fault", HOST, "delay", "ms=3x"]).exit_code == 2
     assert CliRunner().invoke(app, ["fault", HOST, "delay", "ms"]).exit_code == 2
     assert CliRunner().invoke(app, ["fault", HOST, "truth", "name=1"]).exit_code == 1
     assert CliRunner().invoke(app, ["fault", "127.0.0.11", "truth"]).exit_code == 1
@@ -154,6 +155,26 @@ def test_the_greatest_faults_leave_the_controller_alive(process):
     before = truth["n_slices"]
     time.sleep(0.05)
     assert process.fault("truth")["n_slices"] > before
+
+
+def test_a_faults_argument_may_be_a_word_for_shells_eat_quotes(process):
+    told = CliRunner().invoke(app, ["fault", HOST, "terminal", "name=reduced"])
+    assert "reduced" in told.stderr
+    assert "arguments" not in told.stderr
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ("port=30004x", "arguments: port: expected a number, true, false, a list in brackets or a word, got '30004x'"),
+        ("rad=[0,", "arguments: rad: expected a number, true, false, a list in brackets or a word, got '[0,'"),
+        ("port", "arguments: expected name=value, got 'port'"),
+    ],
+)
+def test_a_faults_wrong_argument_is_told_by_name_with_what_came_and_what_was_expected(given, words):
+    result = CliRunner().invoke(app, ["fault", HOST, "drop", given])
+    assert result.exit_code == 2
+    assert words in result.stderr
 
 
 @pytest.mark.parametrize(
