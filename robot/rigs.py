@@ -152,8 +152,8 @@ def _perception_of(resolved: Resolved, *, is_driven: bool) -> Perceives:
 def check_usable(rig: Rig) -> None:
     """Check that a rig whose arm is at an address says which arm is to be found there, and has a bus.
 
-    Without one the arm would be held in the learner's own process, which neither ends when the link is lost nor is watched
-    by another.
+    Without one the arm would be held in the learner's own process, which neither ends when the link is lost nor is
+    watched by another.
 
     Raises:
         RobotConfigError: address or serial are not filled in, or there is an address and no bus.
