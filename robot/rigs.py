@@ -150,12 +150,20 @@ def _perception_of(resolved: Resolved, *, is_driven: bool) -> Perceives:
 
 
 def check_usable(rig: Rig) -> None:
-    """Check that a rig whose arm is at an address says which arm is to be found there.
+    """Check that a rig whose arm is at an address says which arm is to be found there, and has a bus.
+
+    Without one the arm would be held in the learner's own process, which neither ends when the link is lost nor is
+    watched by another.
 
     Raises:
-        RobotConfigError: address or serial are not filled in.
+        RobotConfigError: address or serial are not filled in, or there is an address and no bus.
     """
     if rig.bus is None:
+        if rig.address is not None:
+            raise RobotConfigError(
+                f"rig {rig.name}: expected a bus for the arm at {rig.address}, it has none: an arm on a wire is held "
+                "by a process of its own (`bus: tcp/127.0.0.1:7447`, say)"
+            )
         return
     missing = [key for key, value in (("address", rig.address), ("expected.serial", rig.expected.serial)) if not value]
     if missing:

@@ -14,19 +14,23 @@ from dashboard_client import DashboardClient
 from rtde_control import RTDEControlInterface
 from rtde_receive import RTDEReceiveInterface
 
-from config.arm import Tool
+from config.arm import Servo, Tool
+from robot.errors import StaleStateError
 from robot.hal.pins import Pins
 from robot.hal.protocols import Clock
 from robot.hal.rtde_links import RtdeLinks
 from robot.hal.rtde_outputs import N_OUTPUTS, DigitalOutputs
 from robot.hal.rtde_set_up import arm_watchdog, end_program, prove_watchdog, set_tool
 from robot.hal.ur_calls import bounded
+from robot.messages import Vec6
 
 __all__ = ["ALL_BITS", "RATE_HZ", "TAKE_S", "Readers", "RtdeCommand"]
 
 RATE_HZ = 500.0
 TAKE_S = 8.0
 """Longer than the client takes to be made, or to give up. One that lost its link meanwhile may wait for ever."""
+WRITE_NS = 35_000_000
+"""A command that took longer was no mere sending: the client may have reconnected in it, which takes 40 ms at least."""
 ALL_BITS = (1 << N_OUTPUTS) - 1
 
 Readers: TypeAlias = tuple[RTDEReceiveInterface, DashboardClient]
@@ -80,10 +84,38 @@ class RtdeCommand:
         self._set_up(self.control, receive, clock)
         self._links.require()
 
+    def servo(self, q_rad: Vec6, servo: Servo) -> bool:
+        """Send joints to servo to. Returns whether the client says that it did.
+
+        Raises:
+            StaleStateError: sending took so long that the client may have reconnected, or it threw.
+        """
+        assert self.control is not None, "take made it"
+        begun_ns = monotonic_ns()
+        try:
+            is_taken = self.control.servoJ(list(q_rad), 0.0, 0.0, 1.0 / RATE_HZ, servo.lookahead_s, servo.gain)
+        except RuntimeError as error:
+            raise self._thrown("servoJ", error) from error
+        spent_ns = monotonic_ns() - begun_ns
+        if spent_ns > WRITE_NS:
+            self._links.is_lost = True
+            raise StaleStateError(
+                f"servoJ: expected it sent within {WRITE_NS / 1e6:g} ms, it took {spent_ns / 1e6:.0f} ms; the client "
+                "may have reconnected by itself"
+            )
+        return is_taken
+
     def put(self, signals: int) -> int | None:
-        """Switch the outputs that differ; return the first terminal that the controller did not take, None for none."""
+        """Switch the outputs that differ; return the first terminal that the controller did not take, None for none.
+
+        Raises:
+            StaleStateError: the client threw.
+        """
         assert self.outputs is not None, "take made it"
-        return self.outputs.put(self._pins.pins_out(signals, self.outputs.bits, now_ns=monotonic_ns()))
+        try:
+            return self.outputs.put(self._pins.pins_out(signals, self.outputs.bits, now_ns=monotonic_ns()))
+        except RuntimeError as error:
+            raise self._thrown("digital outputs", error) from error
 
     def drop(self, clock: Clock, *, is_in_traceback: bool = False) -> bool:
         """End the program and forget its client: it must never get the chance to go on by itself.
@@ -114,6 +146,11 @@ class RtdeCommand:
             with suppress(RuntimeError):
                 control.disconnect()
         return is_ended
+
+    def _thrown(self, what: str, error: RuntimeError) -> StaleStateError:
+        """Note that the link is lost, and return the error that says so: a client throws where it cannot reconnect."""
+        self._links.is_lost = True
+        return StaleStateError(f"{what}: expected it sent, the client lost its link and does not get it back: {error}")
 
     def _connected(self) -> RTDEControlInterface:
         self._links.when_uploading()

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable
 
+import mujoco
 import numpy as np
 
 from sim_twin.controller.builtins.state import JOINT_C
@@ -13,7 +14,10 @@ from sim_twin.controller.program import Programs
 from sim_twin.controller.states import RobotMode
 from sim_twin.controller.wire import Outputs, Value
 
-__all__ = ["BUS_V", "COPIES", "JOINT_V", "elbow", "elbow_velocity", "joint_mode", "make_outputs", "robot_current_a"]
+__all__ = [
+    "BUS_V", "COPIES", "JOINT_V", "elbow", "elbow_velocity", "joint_mode", "make_outputs", "momentum_n_s",
+    "robot_current_a",
+]  # fmt: skip
 
 Getters = dict[str, Callable[[], Value]]
 BUS_V, JOINT_V = 48.0, 48.0
@@ -23,7 +27,6 @@ _STEP_S = 1e-6
 _NO_VECTOR = (0.0,) * 6
 _NOT_THERE = (
     "target_execution_time",
-    "actual_momentum",
     "io_current",
     "euromap67_24V_voltage",
     "euromap67_24V_current",
@@ -107,6 +110,14 @@ def robot_current_a(measured: Measured) -> float:
     return sum(map(abs, measured.current_a.tolist()))
 
 
+def momentum_n_s(machine: Machine) -> float:
+    """Return the size of arm and hand's momentum (kg m/s), as of the physics' last step; what it holds is left out."""
+    model, data = machine.world.model, machine.world.data
+    mujoco.mj_subtreeVel(model, data)
+    arm = model.body("link_0").id
+    return float(np.linalg.norm(data.subtree_linvel[arm]) * model.body_subtreemass[arm])
+
+
 def _asked(machine: Machine) -> Getters:
     setpoint = machine.drive.motions.setpoint
     return {
@@ -131,6 +142,7 @@ def _measured(machine: Machine) -> Getters:
         "actual_tool_accelerometer": machine.tool_acceleration,
         "joint_position_deviation_ratio": lambda: drive.deviation_ratio,
         "actual_robot_current": lambda: robot_current_a(drive.measured),
+        "actual_momentum": lambda: momentum_n_s(machine),
         "elbow_position": lambda: elbow(kinematics.rows, drive.measured.q_rad),
         "elbow_velocity": lambda: elbow_velocity(kinematics.rows, drive.measured.q_rad, drive.measured.qd_rad_s),
     }

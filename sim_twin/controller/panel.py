@@ -8,7 +8,7 @@ from sim_twin.controller.machine import Machine
 from sim_twin.controller.modes import Modes
 from sim_twin.controller.motion import DhRow
 from sim_twin.controller.motion.poses import Array
-from sim_twin.controller.outputs import elbow, elbow_velocity, joint_mode, robot_current_a
+from sim_twin.controller.outputs import elbow, elbow_velocity, joint_mode, momentum_n_s, robot_current_a
 from sim_twin.controller.program import UNNAMED, Programs
 from sim_twin.controller.script.builtins import Popup
 from sim_twin.controller.states import Event, RuntimeState, SafetyMode
@@ -253,6 +253,7 @@ class Panel:
             safety_mode=int(modes.safety),
             tool_acceleration_m_s2=machine.tool_acceleration(),
             speed_scaling=drive.core.pace.scale,
+            momentum_norm=momentum_n_s(machine),
             digital_outputs=io.digital_out,
             program_state=int(modes.runtime),
             robot_current_a=robot_current_a(measured),

@@ -17,7 +17,7 @@ from sim_twin.controller.server import PRIORITY, ControllerServer, Setup
 
 __all__ = ["ControllerProcess", "ControllerProcessError", "ask_fault"]
 
-START_S, STOP_S, ANSWER_S = 20.0, 5.0, 5.0
+START_S, STOP_S, ANSWER_S = 60.0, 5.0, 5.0
 _READY, _END = b"ready", b"end"
 
 
@@ -137,6 +137,7 @@ def _serve(setup: bytes, line: Connection) -> None:
             take_priority(PRIORITY)
             server.run(when_ready=lambda: line.send_bytes(_READY), is_over=line.poll)
     except (OSError, ValueError, ConfigError) as error:
-        line.send_bytes(str(error).encode())
+        with suppress(OSError):  # nobody waits any more
+            line.send_bytes(str(error).encode())
     except KeyboardInterrupt:
         pass

@@ -58,12 +58,13 @@ def pytest_runtest_protocol(item, nextitem):
         stalled_s = waited_s() - before_s
         opened = item.config.stash.get(OPENED, None)
         is_repeatable = opened is not None and any(report.failed for report in reports)
+        if is_repeatable:
+            opened.renew()  # repeated or not: a link that was lost here must not fail the next test too
         if attempt == N_ATTEMPTS or stalled_s < STALL_S or not is_repeatable:
             break
         item.config.stash.setdefault(REPEATED, []).append(
             f"{item.nodeid} (the machine was overbooked for {stalled_s:.3f} s)"
         )
-        opened.renew()
         item._initrequest()
     for report in reports:
         if attempt > 1:

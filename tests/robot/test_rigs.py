@@ -1,6 +1,7 @@
 import msgspec
 import pytest
 
+from config.loader import resolve
 from perception.ground_truth import GroundTruthPerception
 from robot.errors import RobotConfigError
 from robot.hal.fake import FakePlant
@@ -59,3 +60,13 @@ def test_an_import_string_of_something_else_is_refused_and_never_called(key, str
     resolved = msgspec.structs.replace(RESOLVED, rig=msgspec.structs.replace(RESOLVED.rig, **{key: string}))
     with pytest.raises(RobotConfigError, match=word):
         build_operator(resolved.rig) if key == "operator" else build_station(resolved)
+
+
+@pytest.mark.parametrize("name", ["lab", "virtual_lab"])
+def test_an_arm_at_an_address_is_never_held_in_the_learners_own_process(name):
+    """A rig's copy without its bus had its station hold the client itself: nobody ended it with its link."""
+    resolved = resolve(rig=name, scenario="paper", learning="default")
+    assert resolved.rig.bus is not None
+    rig = msgspec.structs.replace(resolved.rig, bus=None, address="127.0.0.2")
+    with pytest.raises(RobotConfigError, match="expected a bus for the arm at"):
+        build_station(msgspec.structs.replace(resolved, rig=rig))

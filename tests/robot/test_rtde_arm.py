@@ -251,3 +251,47 @@ def test_a_state_that_stands_still_is_borne_up_to_the_limit_and_not_beyond(monke
 def test_a_state_that_stands_still_is_found_within_50_ms_tick_and_package_counted_and_one_20_ms_late_is_borne():
     assert STALE_NS + 2 * TICK_NS < 50_000_000
     assert STALE_NS > 20_000_000 + 2 * TICK_NS
+
+
+class Lost:
+    """A client that lost its link and cannot reconnect: it throws, whatever is asked of it."""
+
+    def __getattr__(self, name):
+        def throw(*_):
+            raise RuntimeError("Timeout connecting to UR dashboard server.")
+
+        return throw
+
+
+def test_a_client_that_throws_where_it_cannot_reconnect_is_a_lost_link_by_name():
+    made = rtde.RtdeArm(arm=CONFIG, address="127.0.0.1")
+    command = made._command
+    command.control = command.outputs = Lost()
+    with pytest.raises(StaleStateError, match=r"servoJ: .*Timeout connecting"):
+        command.servo((0.0,) * 6, CONFIG.servo)
+    assert made.links.is_lost
+    made.links.is_lost = False
+    command.outputs.bits = 0
+    with pytest.raises(StaleStateError, match=r"digital outputs: .*Timeout connecting"):
+        command.put(1)
+    assert made.links.is_lost
+
+
+def test_a_command_that_took_as_long_as_a_reconnection_is_a_lost_link(monkeypatch):
+    import robot.hal.rtde_command as sending
+
+    class Sent:
+        def servoJ(self, *_):  # noqa: N802 - ur_rtde's name
+            return True
+
+    for spent_ns, is_lost in ((sending.WRITE_NS, False), (sending.WRITE_NS + 1, True)):
+        made, times = rtde.RtdeArm(arm=CONFIG, address="127.0.0.1"), iter((7, 7 + spent_ns))
+        monkeypatch.setattr(sending, "monotonic_ns", lambda times=times: next(times))
+        made._command.control = Sent()
+        if is_lost:
+            with pytest.raises(StaleStateError, match="may have reconnected"):
+                made._command.servo((0.0,) * 6, CONFIG.servo)
+        else:
+            assert made._command.servo((0.0,) * 6, CONFIG.servo)
+        assert made.links.is_lost is is_lost
+        made._command.control = None

@@ -69,6 +69,17 @@ def test_every_number_of_the_realtime_packet_is_the_one_that_rtde_sends(moving):
     assert state.robot_current_a > 0.1
 
 
+def test_the_momentum_is_that_of_every_moving_body_of_the_arm(moving):
+    model, data = moving.machine.world.model, moving.machine.world.data
+    arm = [k for k in range(model.nbody) if model.body_rootid[k] == model.body("link_0").id]
+    before = data.xipos[arm].copy()
+    run(moving)
+    moved = model.body_mass[arm] @ (data.xipos[arm] - before) / 0.002
+    told = moving.outputs["actual_momentum"]()
+    assert told == pytest.approx(np.linalg.norm(moved), rel=0.01)
+    assert told > 0.5
+
+
 def test_the_primary_state_has_the_currents_and_inputs_that_rtde_sends(moving):
     state, told = moving.panel.primary_state(), moving.outputs
     assert state.masterboard.robot_current_a == told["actual_robot_current"]()
