@@ -37,9 +37,9 @@ class NodeStart(Section, frozen=True, kw_only=True):
 
     name: Annotated[str, Meta(pattern=r"^[a-z][a-z0-9_]{0,15}\Z")]
     """Its source on the bus."""
-    kind: Annotated[str, Meta(pattern=r"^(hub|robot|job|other)\Z")] = "other"
-    """The bus's hub, what holds the arm, what commands it and whose end is the end of all, or what the arm can do
-    without: that is started again, and the arm goes on meanwhile."""
+    kind: Annotated[str, Meta(pattern=r"^(hub|robot|perception|job|other)\Z")] = "other"
+    """The bus's hub, what holds the arm, what perceives for that, what commands it and whose end is the end of all, or
+    what the arm can do without: that is started again, and the arm goes on meanwhile."""
     command: Annotated[tuple[str, ...], Meta(min_length=1)]
     """Words of an `autotelic` command; {rig}, {scenario}, {address}, {bus}, {keys}, {cell} and {out} are filled in."""
 

@@ -87,10 +87,10 @@ TRUTH = Topic(
     name="twin/truth", kind=SceneState, writers=(Role.TWIN,), rate_hz=100.0, deadline_s=0.1, priority=Priority.DATA_HIGH
 )
 PERCEPT = Topic(
-    name="percept", kind=Percept, writers=(Role.PERCEPTION, Role.ROBOT), rate_hz=20.0, deadline_s=0.15,
+    name="percept", kind=Percept, writers=(Role.PERCEPTION, Role.ROBOT), rate_hz=50.0, deadline_s=0.15,
     priority=Priority.INTERACTIVE_HIGH,
 )  # fmt: skip
-"""Written by the robot node at the end of each time step, as long as it perceives by itself."""
+"""Written by the perception node; by the robot node at the end of each time step, where that perceives by itself."""
 INTENT = Topic(
     name="intent", kind=Command, writers=COMMANDERS, rate_hz=20.0, deadline_s=0.1, priority=Priority.REAL_TIME,
 )  # fmt: skip

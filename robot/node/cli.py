@@ -6,9 +6,13 @@ from typing import Annotated
 import typer
 
 from config.loader import resolve
+from robot.rigs import load
 from robot.stop_request import StopRequest
 
 __all__ = ["app"]
+
+PERCEIVER = "perception.node:run_perception"
+"""Which room perceives is not known here."""
 
 app = typer.Typer(no_args_is_help=True, help="One process of a rig, as `autotelic up` starts it.")
 
@@ -46,3 +50,14 @@ def recorder(
     with StopRequest() as end:
         recorded = run_recorder(resolved, out, person=person, end=end, tell=lambda line: typer.echo(line, err=True))
     typer.echo(f"{out}: {recorded.n} messages, {recorded.lost()} lost, {recorded.n_left_out} left out", err=True)
+
+
+@app.command()
+def perception(
+    rig: Annotated[str, typer.Option(help="A shipped rig's name or a file.")] = "virtual_lab",
+    scenario: Annotated[str, typer.Option(help="A shipped scenario's name or a file.")] = "paper",
+) -> None:
+    """Perceive for a rig's robot node until Ctrl-C."""
+    resolved = resolve(rig=rig, scenario=scenario)
+    with StopRequest() as end:
+        load(PERCEIVER)(resolved, end=end)

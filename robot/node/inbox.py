@@ -52,6 +52,11 @@ class Inbox:
         with self._came:
             self._came.wait_for(lambda: self.n_waiting > 0, seconds)
 
+    @property
+    def has_stop(self) -> bool:
+        """Whether somebody said stop and nobody has carried it out."""
+        return bool(self._stops)
+
     def stop(self) -> StopAsk | None:
         """Take the oldest stop out."""
         return self._stops.popleft() if self._stops else None

@@ -12,9 +12,11 @@ from robot.lab import LabWorld
 from robot.local_station import LocalStation
 from robot.motion import AskedHand, HandReflexes
 from robot.node.pulse import HealthTeller
+from robot.node.remote_perception import RemotePerception
 from robot.node.robot_node import RobotNode
 from robot.rigs import build_perception, check_usable
 from robot.servo_client import ServoClient
+from robot.station_doors import Perceives
 
 __all__ = ["open_robot_node"]
 
@@ -36,12 +38,23 @@ def open_robot_node(resolved: Resolved) -> Generator[RobotNode]:
             f"rig {rig.name}: expected a table that the twin lays out; where a person does, whoever commands the arm "
             "holds it himself, at the terminal where that person sits (no robot node yet)"
         )
-    perception = build_perception(resolved)
+    is_fed = any(node.kind == "perception" for node in rig.nodes)
     with ExitStack() as stack:
         bus = stack.enter_context(Bus(rig.bus, serial=rig.expected.serial, role=Role.ROBOT, keys=rig.keys))
         loop = ServoClient(resolved)
         truth = RemoteTruth(bus)
         world = LabWorld(loop=loop, truth=truth, resetter=RemoteResetter(bus, loop=loop, truth=truth))
+        node: RobotNode
+        perception: Perceives = (
+            RemotePerception(
+                bus,
+                resolved.scenario,
+                tell=lambda state: node.tell_measured(state),
+                gives_up=lambda: node.is_stop_due,
+            )
+            if is_fed
+            else build_perception(resolved)
+        )
         station = LocalStation(
             world=world, loop=loop, perception=perception, arm=arm, scenario=resolved.scenario, rig=rig
         )
@@ -57,6 +70,7 @@ def open_robot_node(resolved: Resolved) -> Generator[RobotNode]:
             drive=drive,
             halt=loop.halt,
             take_notes=loop.take_notes,
+            is_perceiving=not is_fed,
         )
         stack.callback(node.close)
         stack.callback(HealthTeller(bus, node.pulse).close)

@@ -38,7 +38,7 @@ from robot.bus.station_rows import (
 )
 from robot.bus.topics import ARM_STATE, ASK, INTENT, LAY_OUT, PERCEPT, REPORT, REQUESTED, SENT, STEP, VERDICT
 from robot.errors import BugError, NotEngagedError, RobotError, SafetyError
-from robot.messages import ArmState, StepResult
+from robot.messages import ArmState, Percept, StepResult
 from robot.node.admission import Admission
 from robot.node.inbox import Inbox, Refused
 from robot.node.pulse import Pulse
@@ -67,6 +67,7 @@ class RobotNode:
         drive: has the station's hand do what it is asked (True), or decide by itself (False).
         halt: told of a stop at once, on the bus's thread, for an arm that is held in another process.
         take_notes: returns what ticks of the last time step asked for, thinned.
+        is_perceiving: percepts are this process's own, and told by it.
         now_ns: this process's monotonic clock.
 
     Attributes:
@@ -76,7 +77,8 @@ class RobotNode:
     def __init__(
         self, bus: Bus, station: ServedStation, *, scenario: str, profile: str,
         drive: Callable[[bool], object] = lambda _: None, halt: Callable[[], object] = lambda: None,
-        take_notes: Callable[[], tuple[TickNote, ...]] = tuple, now_ns: Callable[[], int] = monotonic_ns,
+        take_notes: Callable[[], tuple[TickNote, ...]] = tuple, is_perceiving: bool = True,
+        now_ns: Callable[[], int] = monotonic_ns,
     ) -> None:  # fmt: skip
         self._station, self._scenario, self._profile = station, scenario, profile
         self._drive, self._take_notes, self._now_ns = drive, take_notes, now_ns
@@ -86,7 +88,9 @@ class RobotNode:
         self._inbox = Inbox(bus, self._admission, halt=halt)
         self._answerers = bus.answerer(ASK), bus.answerer(LAY_OUT)
         self._steps, self._reports = bus.publisher(STEP), bus.publisher(REPORT)
-        self._states, self._percepts = bus.publisher(ARM_STATE), bus.publisher(PERCEPT)
+        self._states, self._percepts = bus.publisher(ARM_STATE), bus.publisher(PERCEPT) if is_perceiving else None
+        self._told_ns: int | None = None
+        """Stamp of the measurement that was told last."""
         self._verdicts, self._sent = bus.publisher(VERDICT), bus.publisher(SENT)
         self._requested = bus.publisher(REQUESTED)
         self._begun, self._revision = secrets.randbits(48), 0
@@ -129,6 +133,11 @@ class RobotNode:
         if refused is not None:
             self._say_refused(refused)
         self._look()
+
+    @property
+    def is_stop_due(self) -> bool:
+        """Whether somebody said stop and it waits to be confirmed."""
+        return self._inbox.has_stop
 
     def close(self) -> None:
         """Stop the arm and let go of it. Idempotent."""
@@ -185,8 +194,9 @@ class RobotNode:
 
     def _publish_parts(self, result: StepResult, measured: ArmState) -> None:
         """Tell whoever watches what came of a time step, one topic each."""
-        self._put(self._states, measured)
-        self._put(self._percepts, result.percept)
+        if measured.stamp_ns != self._told_ns:
+            self.tell_measured(measured)
+        self._tell_percept(result.percept)
         notes = self._take_notes()
         for note in notes:
             self._put(self._requested, note.requested)
@@ -245,7 +255,7 @@ class RobotNode:
                 station.clear_latch(by=by)
             case LayOut(seed=seed, epoch=epoch):
                 percept = station.reset(seed=seed, epoch=epoch)
-                self._put(self._percepts, percept)
+                self._tell_percept(percept)
                 return StationTold(report=self._report(), percept=percept, measured=station.measured)
             case HandOver(to=to):
                 station.hand_over(to, life_ns=HANDED_LIFE_NS)
@@ -280,11 +290,20 @@ class RobotNode:
         if not self._station.lease_number and now_ns - self._measure_ns >= self._pause_ns:
             self._measure(now_ns)
 
+    def tell_measured(self, state: ArmState) -> None:
+        """Tell a measurement: whoever perceives answers it."""
+        self._told_ns = state.stamp_ns
+        self._put(self._states, state)
+
+    def _tell_percept(self, percept: Percept) -> None:
+        if self._percepts is not None:
+            self._put(self._percepts, percept)
+
     def _measure(self, now_ns: int) -> None:
         """Read an arm that nobody commands; one that cannot be read is tried again with growing pauses."""
         self._measure_ns = now_ns
         try:
-            self._put(self._states, self._station.measure())
+            self.tell_measured(self._station.measure())
             self._pause_ns = MEASURE_NS
         except RobotError as error:
             self.pulse.fail(str(error))

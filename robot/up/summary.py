@@ -4,6 +4,8 @@ from enum import IntEnum
 
 import msgspec
 
+from robot.up.clocks import ClockOffset
+
 __all__ = ["Event", "NodeSummary", "Summary", "Worst"]
 
 
@@ -52,3 +54,5 @@ class Summary(msgspec.Struct, frozen=True, kw_only=True):
     stop_last_ms: float | None
     """The same, before the arm was let go of."""
     logs: str
+    clocks: tuple[ClockOffset, ...] = ()
+    """Of all processes on the bus that answered at the end, those of other machines among them."""

@@ -14,6 +14,7 @@ from robot.bus.session import Bus
 from robot.bus.topics import HEALTH
 from robot.node.stop_caller import StopCaller
 from robot.up.child import Child
+from robot.up.clocks import ClockAsker, ClockBook
 from robot.up.logs import Logs
 from robot.up.plan import Backoff, NodePlan
 from robot.up.summary import Event, NodeSummary, Summary, Worst
@@ -38,6 +39,8 @@ class _Node:
         self.child: Child | None = None
         self.code: int | None = None
         self.n_starts = 0
+        self.begun_s = 0.0
+        """When it was started last."""
         self.again_s: float | None = None
         """When it is started again."""
         self.is_silent = self.is_over = False
@@ -66,6 +69,8 @@ class Supervisor:
         self._bus: Bus | None = None
         self._stops: StopCaller | None = None
         self.book = HealthBook(tuple(self.nodes), clock=clock_number(), now_s=now_s)
+        self.clocks = ClockBook()
+        self._clock_asker: ClockAsker | None = None
         self.events: list[Event] = []
         self._worst = Worst.NOTHING
         self._first_s: float | None = None
@@ -107,6 +112,7 @@ class Supervisor:
 
     def _start(self, node: _Node) -> None:
         node.n_starts += 1
+        node.begun_s = self._now_s()
         node.again_s, node.is_silent = None, False
         node.child = Child(node.plan, self._logs)
         self.book.begin(node.plan.name, node.child.pid)
@@ -127,6 +133,7 @@ class Supervisor:
         except BusError:
             return
         self._bus, self._stops = bus, StopCaller(bus, by="the supervisor")
+        self._clock_asker = ClockAsker(bus, self.clocks)
         self._health = bus.subscriber(HEALTH, lambda received: self.book.take(received))
 
     # --------------------------------------------------------------------------------------------------------- watch
@@ -148,6 +155,11 @@ class Supervisor:
     def _listen(self, node: _Node, child: Child) -> None:
         """Stop the arm where a process is silent, and end the process where it stays so."""
         name = node.plan.name
+        is_unheard = node.plan.kind != "job" and self.book.age_s(name) is None
+        if is_unheard and not self.book[name].is_leaving and self._now_s() - node.begun_s > START_S:
+            self._note(node, f"not heard within {START_S:g} s of its start: it is killed", Worst.MENDED)
+            child.kill()
+            return
         if not self.book.is_silent(name, for_s=SILENT_S, hub=self._hub):
             if node.is_silent:
                 node.is_silent = False
@@ -217,6 +229,8 @@ class Supervisor:
         for node in (*robots, *rest):
             self._signal(node, signal.SIGINT)
             self._await(node, END_S)
+        if self._clock_asker is not None:
+            self._clock_asker.close()
         if self._stops is not None and self._bus is not None:
             self._stops.close()
             self._bus.close()
@@ -265,4 +279,5 @@ class Supervisor:
         return Summary(
             rig=self._rig, seconds=self._now_s() - self._begun_s, exit_code=int(self._worst), nodes=tuple(nodes),
             events=tuple(self.events), stop_first_ms=first_ms, stop_last_ms=last_ms, logs=str(self._logs.folder),
+            clocks=self.clocks.offsets(),
         )  # fmt: skip

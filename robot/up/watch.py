@@ -23,6 +23,8 @@ class Heard(msgspec.Struct, kw_only=True):
     """When it was heard last; None since it was started (again) and not heard yet."""
     pid: int = 0
     """Of the process that was started; the word of another of that name is not its word."""
+    is_leaving: bool = False
+    """It said so, and is silent since."""
     is_same_clock: bool = True
     most_late_ms: float = 0.0
     most_mb: float = 0.0
@@ -47,7 +49,8 @@ class HealthBook:
 
     def begin(self, name: str, pid: int) -> None:
         """Note that a process was started: what was heard of it before says nothing of it."""
-        self._by_name[name].heard_s, self._by_name[name].pid = None, pid
+        heard = self._by_name[name]
+        heard.heard_s, heard.pid, heard.is_leaving = None, pid, False
 
     def take(self, received: Received[Health]) -> None:
         """Take a word in. Called on the bus's thread."""
@@ -59,6 +62,7 @@ class HealthBook:
         heard.most_late_ms = max(heard.most_late_ms, health.late_ms)
         heard.most_mb = max(heard.most_mb, health.rss_mb)
         heard.is_same_clock = health.clock == self._clock
+        heard.is_leaving = health.is_leaving
         heard.health, heard.heard_s = health, None if health.is_leaving else self._now_s()
 
     def age_s(self, name: str) -> float | None:

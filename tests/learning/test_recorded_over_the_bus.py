@@ -62,12 +62,12 @@ class Learner:
         self.bus = Bus(endpoint, serial=SERIAL, role=Role.LEARNING)
         self.bus.open()
         self.remote = RemoteStation(self.bus, asker=NodeAsker(self.bus, wait_s=5.0))
-        SimulatedOperator().arm_once(self.remote)
         self.account = BusAccount(self.remote.open_account(), resolved(), seed=SEED)
         self.station = self.account.station(self.remote, measure=lambda: self.remote.measured)
         self.agent = build_agent(resolved(), self.station.spec, seed=SEED)
         self.heard = RecordedDecisions(self.account, [goal.name for goal in fake_rig().scenario.goals])
         self.agent.witness = self.heard
+        SimulatedOperator().arm_once(self.remote)  # last: a lease ends while torch is imported
         self.account.open(0, encode(self.agent.state_dict()))
         self.n_done = 0
 

@@ -8,6 +8,7 @@ import os
 import re
 import signal
 import time
+from contextlib import suppress
 
 import pytest
 
@@ -26,7 +27,7 @@ REST_S = 0.8
 """From the fault to rest: 120 ms until silence is noticed, the stop itself, and what a poll over a port takes."""
 CASES = [
     (node, what)
-    for node in ("learning", "robot", "twin")
+    for node in ("learning", "robot", "perception", "twin")
     for what in ("kill", "freeze_1s", "freeze_8s", "terminate")
 ]  # fmt: skip
 
@@ -72,6 +73,18 @@ class Up:
             assert time.monotonic() < end, self.log()
             time.sleep(0.05)
 
+    def until_recording(self, timeout_s=60.0):
+        end = time.monotonic() + timeout_s
+        n_bytes, grown = self.n_recorded(), 0
+        while grown < 4:
+            assert time.monotonic() < end
+            time.sleep(0.5)
+            n_before, n_bytes = n_bytes, self.n_recorded()
+            grown = grown + 1 if n_bytes > n_before else 0
+
+    def n_recorded(self):
+        return sum(path.stat().st_size for path in (self.folder / "up/sessions").glob("*.mcap"))
+
     def end(self):
         self.process.send_signal(signal.SIGINT)
         out, _ = self.process.communicate(timeout=90)
@@ -108,6 +121,25 @@ def rests_after_s(lab, seconds):
     return (moved - first["n_slices"]) * SLICE_S
 
 
+@pytest.mark.parametrize("what", ["kill", "freeze_1s", "freeze_8s"])
+def test_an_arm_whose_recorder_fails_goes_on(lab, what):
+    lab.until_moving()
+    lab.until_recording()
+    before, pid = lab.log(), lab.pid("recorder")
+    bring_about(what, pid)
+    lab.until_moving(5.0)
+    if what.startswith("freeze"):
+        time.sleep(float(what[7:-1]))
+        with suppress(ProcessLookupError):  # one that was frozen for long was killed
+            os.kill(pid, signal.SIGCONT)
+    if what != "freeze_1s":
+        lab.until_told("recorder: started as process", len(before))
+    lab.until_moving()
+    told = lab.log()[len(before) :]
+    assert "arm is stopped" not in told
+    assert "stop confirmed" not in told
+
+
 @pytest.mark.parametrize(("node", "what"), CASES, ids=[f"{node}_{what}" for node, what in CASES])
 def test_an_arm_whose_process_fails_rests_and_the_run_goes_on(lab, node, what):
     lab.until_moving()
@@ -142,13 +174,13 @@ def test_an_arm_whose_process_fails_rests_and_the_run_goes_on(lab, node, what):
 
 def test_ctrl_c_stops_the_arm_first_and_last_and_leaves_no_process(lab):
     lab.until_moving()
-    pids = [lab.pid(node) for node in ("learning", "robot", "twin")]
+    pids = [lab.pid(node) for node in ("learning", "robot", "perception", "recorder", "twin")]
     code, summary = lab.end()
     assert code == summary["exit_code"] == 3, summary["events"][-12:]
     assert summary["stop_first_ms"] is not None
     assert summary["stop_last_ms"] is not None
     ended = [event["node"] for event in summary["events"] if "ended with exit code" in event["what"]]
-    assert ended[-2:] == ["robot", "twin"]
+    assert ended[-4:] == ["robot", "perception", "recorder", "twin"]
     for pid in pids:
         with pytest.raises(ProcessLookupError):
             os.kill(pid, 0)

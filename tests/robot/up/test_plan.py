@@ -19,15 +19,20 @@ VALUES = dict.fromkeys(("rig", "scenario", "address", "bus", "keys", "cell", "ou
 def test_virtual_lab_starts_its_hub_then_what_holds_the_arm_then_what_commands_it():
     plans = plans_of(RIG, VALUES, more=("--epochs", "3"))
     assert [(plan.name, plan.kind) for plan in plans] == [
-        ("twin", "hub"), ("recorder", "other"), ("robot", "robot"), ("learning", "job"),
+        ("twin", "hub"), ("recorder", "other"), ("perception", "perception"), ("robot", "robot"), ("learning", "job"),
     ]  # fmt: skip
     assert plans[-1].words[-2:] == ("--epochs", "3")
     assert not [word for plan in plans for word in plan.words if "{" in word]
 
 
 def test_what_is_left_out_is_not_started_and_must_be_there():
-    assert [plan.name for plan in plans_of(RIG, VALUES, without=("learning",))] == ["twin", "recorder", "robot"]
-    words = "--without: expected some of twin, recorder, robot, learning, came printer"
+    assert [plan.name for plan in plans_of(RIG, VALUES, without=("learning",))] == [
+        "twin",
+        "recorder",
+        "perception",
+        "robot",
+    ]
+    words = "--without: expected some of twin, recorder, perception, robot, learning, came printer"
     with pytest.raises(RobotConfigError, match=words):
         plans_of(RIG, VALUES, without=("printer",))
 

@@ -1,0 +1,139 @@
+"""A percept that came over the bus is at the measurement's stamp, or under its own; one that is too old is none."""
+
+import math
+
+import msgspec
+import pytest
+
+from robot.bus.envelope import Envelope, Origin
+from robot.bus.inlet import Received
+from robot.bus.topics import PERCEPT
+from robot.errors import StaleStateError
+from robot.node.remote_perception import RemotePerception
+from robot.station_doors import Perceives, Sighted
+from tests.support.stations import arm_state, fake_rig, percept
+
+SCENARIO = fake_rig().scenario
+PLACES = {name: (0.4, 0.1 * k, 0.02) for k, name in enumerate(SCENARIO.distances) if name != "table"}
+ORIGIN = Origin(schema=b"", clock=7, begun_ns=0, source="perception")
+DEADLINE_NS = round(PERCEPT.deadline_s * 1e9)
+Q = (0.0, -1.5, 1.5, -1.5, -1.5, 0.0)
+
+
+class Air:
+    """What stands for a bus: percepts come when a measurement is told, or when they are put."""
+
+    error = None
+
+    def __init__(self, answer=None):
+        self.now_ns, self.told, self._answer = 10_000_000_000, [], answer
+        self.remote = RemotePerception(self, SCENARIO, tell=self._tell, now_ns=lambda: self.now_ns)
+
+    def subscriber(self, topic, on_message):
+        assert topic is PERCEPT
+        self._take = on_message
+        return self
+
+    def close(self):
+        pass
+
+    def put(self, message, *, seen_ns, is_same_clock=True):
+        envelope = Envelope(origin=ORIGIN, sequence=0, stamp_ns=seen_ns)
+        age_ns = self.now_ns - seen_ns if is_same_clock else None
+        self._take(Received(message=message, envelope=envelope, arrived_ns=self.now_ns, age_ns=age_ns))
+
+    def _tell(self, state):
+        self.told.append(state)
+        if self._answer is not None:
+            self._answer(self, state)
+        else:
+            self.now_ns += 200_000_000
+
+
+def answer_at_once(air, state):
+    air.put(percept(PLACES, tcp_m=state.tcp_position_m, stamp_ns=state.stamp_ns), seen_ns=air.now_ns - 1_000_000)
+
+
+def settled(air):
+    """Have percepts of the new table come, so that the next look needs none of them."""
+    air.remote._is_new_table = False
+    return air
+
+
+def arm(air, **changes):
+    return arm_state(Q, stamp_ns=air.now_ns, **changes)
+
+
+def test_it_fits_the_doors_of_a_station():
+    air = Air()
+    fits: tuple[Perceives, Sighted] = (air.remote, air.remote)
+    assert isinstance(fits[1], Sighted)
+
+
+def test_the_percept_at_the_measurement_s_stamp_is_returned_as_it_came():
+    air = settled(Air(answer_at_once))
+    state = arm(air)
+    found = air.remote.perceive(state, None)
+    assert found == percept(PLACES, tcp_m=state.tcp_position_m, stamp_ns=state.stamp_ns)
+    assert air.told == [state]
+
+
+def test_without_an_answer_the_newest_is_completed_by_what_the_arm_knows_and_keeps_its_own_stamp():
+    air = settled(Air(lambda *_: None))
+    seen_ns = air.now_ns - 40_000_000
+    air.put(percept(PLACES, tcp_m=(0.0, 0.0, 0.5), stamp_ns=air.now_ns - 50_000_000), seen_ns=seen_ns)
+    state = arm(air, tcp_m=(0.4, 0.0, 0.32))
+    found = air.remote.perceive(state, None)
+    assert (found.stamp_ns, found.tcp_position_m, found.grip) == (seen_ns, state.tcp_position_m, state.grip)
+    for name, distance_m in zip(SCENARIO.distances, found.distances_m, strict=True):
+        expected = 0.32 - SCENARIO.table.height_m if name == "table" else math.dist(state.tcp_position_m, PLACES[name])
+        assert distance_m == pytest.approx(expected)
+
+
+@pytest.mark.parametrize(("age_ns", "is_taken"), [(DEADLINE_NS, True), (DEADLINE_NS + 1, False)])
+def test_a_percept_is_too_old_beyond_its_deadline(age_ns, is_taken):
+    air = settled(Air(lambda *_: None))
+    air.put(percept(PLACES, tcp_m=(0.4, 0.0, 0.2)), seen_ns=air.now_ns - age_ns)
+    if is_taken:
+        assert air.remote.perceive(arm(air), None).stamp_ns == air.now_ns - age_ns
+    else:
+        with pytest.raises(StaleStateError, match=r"not older than 150 ms, the newest is 150 ms old"):
+            air.remote.perceive(arm(air), None)
+
+
+def test_from_another_machine_a_percept_s_age_counts_from_its_arrival():
+    air = settled(Air(lambda *_: None))
+    air.put(percept(PLACES, tcp_m=(0.4, 0.0, 0.2)), seen_ns=5, is_same_clock=False)
+    assert air.remote.perceive(arm(air), None).stamp_ns == air.now_ns
+    air.now_ns += DEADLINE_NS + 1
+    with pytest.raises(StaleStateError):
+        air.remote.perceive(arm(air), None)
+
+
+def test_after_a_reset_percepts_from_before_do_not_count():
+    air = Air(lambda *_: None)
+    air.put(percept(PLACES, tcp_m=(0.4, 0.0, 0.2)), seen_ns=air.now_ns)
+    air._answer = None
+    air.remote.forget()
+    with pytest.raises(StaleStateError, match="none came"):
+        air.remote.perceive(arm(air), None)
+    air = Air(answer_at_once)
+    air.remote.forget()
+    state = arm(air)
+    assert air.remote.perceive(state, None).stamp_ns == state.stamp_ns
+    assert len(air.told) > 3
+
+
+def test_a_percept_of_another_measurement_is_not_taken_for_this_one_s():
+    air = settled(Air(answer_at_once))
+    state = arm(air)
+    air._answer = lambda air, told: answer_at_once(air, msgspec.structs.replace(told, stamp_ns=told.stamp_ns - 1))
+    assert air.remote.perceive(state, None).stamp_ns == air.now_ns - 1_000_000
+
+
+def test_a_new_table_is_waited_for_no_longer_where_somebody_says_stop():
+    air = Air(lambda *_: None)
+    air.remote._gives_up = lambda: len(air.told) >= 2
+    with pytest.raises(StaleStateError, match="none came"):
+        air.remote.perceive(arm(air), None)
+    assert len(air.told) == 3
