@@ -44,12 +44,17 @@ suite.WORLDS["virtual_lab"] = {kind}
 """
 
 
+ONCE = "def test_once(world):\n    assert world.n_renewed == 1\n"
+EVERY_OTHER = "runs = []\ndef test_once(world):\n    runs.append(1)\n    assert len(runs) % 2 == 0\n"
+
+
 @pytest.mark.parametrize(
-    ("kind", "told"), [("Shut", "OSError: its port is taken"), ("Open", "1 passed")], ids=["shut", "open"]
+    ("kind", "body", "told"),
+    [("Shut", ONCE, "OSError: its port is taken"), ("Open", ONCE, "1 passed"), ("Open", EVERY_OTHER, "1 failed")],
+    ids=["shut", "open", "every_other"],
 )
-def test_a_failure_is_repeated_where_a_world_stands_and_told_as_it_is_where_none_opened(tmp_path, kind, told):
+def test_a_failure_is_repeated_where_a_world_stands_and_must_then_pass_twice_running(tmp_path, kind, body, told):
     (tmp_path / "conftest.py").write_text(STALLING.replace("{kind}", kind), encoding="utf-8")
-    body = "def test_once(world):\n    assert world.n_renewed == 1\n"
     (tmp_path / "test_once.py").write_text(body, encoding="utf-8")
     command = ["-m", "pytest", "-q", "-p", "no:cacheprovider", "-k", "virtual_lab", "--rootdir", str(tmp_path), "."]
     said = subprocess.run(
