@@ -15,8 +15,10 @@ from robot.hal.ur_primary import ArmFacts
 __all__ = ["check_facts", "check_pose", "check_serial", "flange_pose", "tool_off_m"]
 
 CALIBRATION_M, CALIBRATION_RAD = 0.01, 0.05
-"""Farther than this from nominal is no calibration of this model. A UR5e's own lie within some millimetres and mrad; a
-and d of joints 2 and 3 may be shifted against one another far more, so that only their sum is compared."""
+"""Farther than this from nominal is no calibration of this model. A UR5e's own lie within some millimetres and mrad."""
+OFFSETS = (slice(0, 1), slice(1, 4), slice(4, 5), slice(5, 6))
+"""Link offsets by what is compared: d of the three joints whose axes are parallel may be shifted against one another as
+far as a calibration likes, so that only their sum tells the model."""
 POSE_M, POSE_RAD = 1e-4, 1e-3
 LIMIT_RAD = 1e-3
 
@@ -62,8 +64,14 @@ def check_facts(facts: ArmFacts, arm: ArmConfig) -> None:
                 f"joint {joint.name}: expected a speed of at most the arm's own {facts.qd_max_rad_s[i]:.3f} rad/s, the "
                 f"file gives {joint.speed_rad_s:.3f}: lower it there"
             )
-    if not abs(sum(facts.d_m) - sum(j.d_m for j in arm.joints)) <= CALIBRATION_M:
-        raise RobotConfigError("expected the link offsets of the arm's file, the arm says others: is it another model?")
+    ours_m = [joint.d_m for joint in arm.joints]
+    for part in OFFSETS:
+        ours, its = sum(ours_m[part]), sum(facts.d_m[part])
+        if not abs(ours - its) <= CALIBRATION_M:
+            name = " + ".join(f"d{i + 1}" for i in range(part.start, part.stop))
+            raise RobotConfigError(
+                f"expected {name} of {ours:g} m as in the arm's file, the arm says {its:g}: is this another model?"
+            )
 
 
 def check_pose(facts: ArmFacts) -> None:

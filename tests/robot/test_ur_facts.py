@@ -109,11 +109,17 @@ def test_a_calibrated_arm_is_accepted_and_its_own_numbers_are_used():
         check_pose(facts(alpha_rad=(math.pi / 2 + 1e-3, *dh("alpha_rad")[1:])))
 
 
+def test_offsets_shifted_along_parallel_axes_are_a_calibration_of_the_same_model():
+    check_facts(facts(d_m=(0.1625, -12.4, 8.1, 4.3 + 0.1333, 0.0997, 0.0996)), ARM)
+
+
 @pytest.mark.parametrize(
     ("changes", "word"),
     [
         ({"a_m": (0.0, -0.612, -0.5723, 0.0, 0.0, 0.0)}, "another model"),  # a UR10
-        ({"d_m": (0.1807, 0.0, 0.0, 0.17415, 0.11985, 0.11655)}, "link offsets"),
+        ({"d_m": (0.1807, 0.0, 0.0, 0.17415, 0.11985, 0.11655)}, "expected d1 of"),
+        ({"d_m": (0.1625, 0.0, 0.0, 0.1533, 0.0997, 0.0996)}, r"d2 \+ d3 \+ d4 of"),
+        ({"d_m": (0.1625, 0.0, 0.0, 0.1333, 0.0797, 0.1196)}, "expected d5 of"),
         ({"q_max_rad": (1.0, *(2 * math.pi,) * 5)}, "narrow it"),
         ({"qd_max_rad_s": (1.0,) * 6}, "lower it"),
     ],
