@@ -22,6 +22,7 @@ from robot.motion.holding import (
     tips_too_fast,
     too_fast,
 )
+from robot.motion.swinging import of_swings
 
 __all__ = ["Ahead"]
 
@@ -39,7 +40,13 @@ class Ahead:
         self._chain, self._envelope, self._tip_min_m = chain, envelope, tip_min_m
 
     def met(
-        self, now_rad: Vec6, steps: list[float], places: tuple[Points, Place, Place], *, is_straight: bool
+        self,
+        now_rad: Vec6,
+        steps: list[float],
+        places: tuple[Points, Place, Place],
+        past: tuple[Points, Points],
+        *,
+        is_straight: bool,
     ) -> list[Met]:
         """Return the limits that steps go at too fast. Joints' ways bend: where a stop would end is looked at too.
 
@@ -47,6 +54,7 @@ class Ahead:
             now_rad: the last command.
             steps: how far each joint would go.
             places: points at the command before the last; points and tilt at the last and where the step leads.
+            past: points before and after the step SWING_S ago.
             is_straight: the tool goes straight and slides along its fences.
         """
         envelope, floor_m = self._envelope, self._tip_min_m
@@ -56,6 +64,7 @@ class Ahead:
         lost = brake_share(fastest, envelope)
         end = self._rest(now_rad, places[1], steps)
         met = stops_outside(end, self._lowest_m(end), floor_m, _least_m(is_straight=is_straight), envelope)
+        met += of_swings(places[1][0], places[2][0], past, envelope)
         if is_straight:
             return met + too_fast(now_rad, steps, places, None, lost, envelope)
         heights_m = (self._lowest_m(places[1]), self._lowest_m(places[2]), self._lowest_m(end))

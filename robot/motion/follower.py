@@ -1,6 +1,7 @@
 """The set-point that follows a target: straight lines of the tool pointing down, or joints, jerk-limited either way."""
 
 import math
+from collections import deque
 from operator import le
 
 from config.arm import ArmConfig
@@ -12,10 +13,11 @@ from robot.motion.ahead import Ahead
 from robot.motion.chords import share_of_speed
 from robot.motion.free import free_bounds, is_free_step
 from robot.motion.guarding import guarded_share, is_guarded
-from robot.motion.holding import Place, slid
+from robot.motion.holding import Place, Points, slid
 from robot.motion.lean import Lean
 from robot.motion.limiter import AxisLimits, Limiter
 from robot.motion.pacing import braked, part_way, window
+from robot.motion.swinging import SWING_S
 
 __all__ = ["SWIFT_TICK_S", "Follower"]
 
@@ -71,6 +73,9 @@ class Follower:
         """
         motion, joints = arm.motion, arm.joints
         self._envelope = envelope
+        self._n_past = round(SWING_S / tick_s) + 1
+        self._past: deque[Points] = deque(maxlen=self._n_past)
+        """Points of the last commands, the oldest two a step SWING_S ago."""
         self._fence_names = {fence.name for fence in envelope.fences}
         self._is_swift = tick_s < SWIFT_TICK_S
         self._kinematics = Kinematics(arm, is_swift=True)
@@ -107,6 +112,7 @@ class Follower:
         self._is_fenced = False
         self._points = self._kinematics.chain.points(q_rad)
         self._points_before = self._points[0]
+        self._past.extend([self._points_before] * self._n_past)
         self.target_m = self._kinematics.tcp(q_rad)
         self.yaw_rad = self._home_yaw_rad
         self._is_upright = self._is_solved = False
@@ -215,6 +221,8 @@ class Follower:
         q = self._step_tool() if self._is_upright else _vec6(self._joints.step())
         if q != self.q_rad or q != self.q_before_rad:
             q = self._hold_back(q)
+        else:
+            self._past.append(self._points[0])
         if self._tool.is_failed or self._joints.is_failed:
             self.trouble = "brake"
         self._q_earlier_rad, self.q_before_rad, self.q_rad = self.q_before_rad, self.q_rad, q
@@ -279,11 +287,11 @@ class Follower:
         chain, now, envelope, ends = self._kinematics.chain, self.q_rad, self._envelope, self._envelope.joints
         steps = (q, now, self.q_before_rad, self._q_earlier_rad)
         is_free, points = is_free_step(
-            steps, self._points_before, self._points, chain.rows, self._bounds, envelope.joint_rows,
-            envelope.fence_rows, self._is_upright,
+            steps, self._points_before, self._points, (self._past[0], self._past[1]), chain.rows, self._bounds,
+            envelope.joint_rows, envelope.fence_rows, self._is_upright,
         )  # fmt: skip
         if is_free:
-            self._points_before, self._points = self._points[0], points
+            self._move_on(points)
             return q
         within = window(now, self.q_before_rad, self._q_earlier_rad, ends)
         wanted = [a - b for a, b in zip(q, now, strict=True)]
@@ -292,7 +300,7 @@ class Follower:
             base = braked(now, self.q_before_rad, self._q_earlier_rad, ends, within)
             share, name = part_way(wanted, base, within.low, within.high), "joint_acceleration"
         places, is_straight = (self._points_before, self._points, points), self._is_upright
-        met = self._ahead.met(now, wanted, places, is_straight=is_straight)
+        met = self._ahead.met(now, wanted, places, (self._past[0], self._past[1]), is_straight=is_straight)
         if met:
             if base is wanted:
                 base = braked(now, self.q_before_rad, self._q_earlier_rad, ends, within)
@@ -305,8 +313,12 @@ class Follower:
             q = _moved(now, [b + share * (w - b) for w, b in zip(wanted, base, strict=True)])
             points = chain.points(q)
             self._go_on(q, points[0][0], is_braking_kept=not is_pushed)
-        self._points_before, self._points = self._points[0], points
+        self._move_on(points)
         return q
+
+    def _move_on(self, points: Place) -> None:
+        self._points_before, self._points = self._points[0], points
+        self._past.append(points[0])
 
     def _go_on(self, q: Vec6, tcp_m: Vec3, *, is_braking_kept: bool = False) -> None:
         """Let the limiter in charge go on from joints that are other than it said."""

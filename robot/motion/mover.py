@@ -178,7 +178,7 @@ class Mover:
             moved = self._contact.reseat(state.tcp_force_n, state.tcp_position_m, commanded_m, follower.target_m)
             if moved is not None:
                 self._note("contact")
-                if not self._contact.is_led_up(state.tcp_force_n, state.tcp_position_m, moved):
+                if not self._contact.is_led_up(state.tcp_force_n, state.tcp_position_m, commanded_m, moved):
                     return self._give_way(moved, state)
                 follower.aim(moved, follower.yaw_rad)
         if self._way is not None and next(self._way, FOUND) is FOUND:
