@@ -67,6 +67,21 @@ class ContactGuard:
             return (x, y, lowest), True
         return wanted_m, False
 
+    def is_led_up(self, force_n: Vec3, measured_m: Vec3, commanded_m: Vec3, target_m: Vec3) -> bool:
+        """Return whether a tool is asked to rise from what presses on it, and need not fall back first.
+
+        Sideways pushes took its command back to the measured tool in every tick, so that one which a button's cap held
+        against a fence never rose from it, with 280 N on its fingers.
+
+        Args:
+            force_n: Force of the world on the tool.
+            measured_m: Where the tool is.
+            commanded_m: Where it was told to be by now; lower than it is it must fall back.
+            target_m: Where it is to go.
+        """
+        is_risen = min(target_m[2] - RISEN_M, commanded_m[2] + RISEN_M) > measured_m[2]
+        return is_risen and force_n[2] > self._force_n
+
     def reseat(self, force_n: Vec3, measured_m: Vec3, commanded_m: Vec3, target_m: Vec3) -> Vec3 | None:
         """Return where the target must go because of the force on the tool, or None to leave it.
 

@@ -1,6 +1,7 @@
 """The set-point that follows a target: straight lines of the tool pointing down, or joints, jerk-limited either way."""
 
 import math
+from collections import deque
 from operator import le
 
 from config.arm import ArmConfig
@@ -8,29 +9,15 @@ from robot.envelope import Envelope
 from robot.geometry import turn_about_vertical, unwound
 from robot.kinematics import Kinematics, UnreachableError
 from robot.messages import Vec3, Vec6
+from robot.motion.ahead import Ahead
 from robot.motion.chords import share_of_speed
 from robot.motion.free import free_bounds, is_free_step
-from robot.motion.holding import (
-    MARGIN_M,
-    OVERRUN_M,
-    REST,
-    TIP,
-    TIPS,
-    Met,
-    Place,
-    brake_share,
-    share_at_rest,
-    share_left,
-    share_of_way,
-    slid,
-    stops_outside,
-    stretch,
-    tips_too_fast,
-    too_fast,
-)
+from robot.motion.guarding import guarded_share, is_guarded
+from robot.motion.holding import Place, Points, slid
 from robot.motion.lean import Lean
 from robot.motion.limiter import AxisLimits, Limiter
 from robot.motion.pacing import braked, part_way, window
+from robot.motion.swinging import SWING_S
 
 __all__ = ["SWIFT_TICK_S", "Follower"]
 
@@ -66,7 +53,15 @@ class Follower:
         held: What held the last tick back and by which share of its step, if anything did.
     """
 
-    def __init__(self, arm: ArmConfig, *, envelope: Envelope, tick_s: float, tip_min_m: float = -math.inf) -> None:
+    def __init__(
+        self,
+        arm: ArmConfig,
+        *,
+        envelope: Envelope,
+        tick_s: float,
+        tip_min_m: float = -math.inf,
+        guard_z_m: float = -math.inf,
+    ) -> None:
         """Put the parts together.
 
         Args:
@@ -74,14 +69,20 @@ class Follower:
             envelope: what of the limits profile is held.
             tick_s: how long a tick is.
             tip_min_m: how low fingertips may go on the way to joints, base frame; upright, their target sees to it.
+            guard_z_m: below this height the tool goes down and sideways at guarded speed, base frame.
         """
         motion, joints = arm.motion, arm.joints
-        self._envelope, self._tip_min_m = envelope, tip_min_m
+        self._envelope = envelope
+        self._n_past = round(SWING_S / tick_s) + 1
+        self._past: deque[Points] = deque(maxlen=self._n_past)
+        """Points of the last commands, the oldest two a step SWING_S ago."""
         self._fence_names = {fence.name for fence in envelope.fences}
         self._is_swift = tick_s < SWIFT_TICK_S
         self._kinematics = Kinematics(arm, is_swift=True)
+        self._ahead = Ahead(self._kinematics.chain, envelope, tip_min_m=tip_min_m)
         self._lean = Lean(tick_s=tick_s)
         self._home_yaw_rad = arm.tool_yaw_rad
+        self._guard_z_m, self._guarded_m_s, self._speed_m_s = guard_z_m, motion.guarded_speed_m_s, motion.speed_m_s
         self._tick_s = tick_s
         self._tool = Limiter(
             AxisLimits(
@@ -111,6 +112,7 @@ class Follower:
         self._is_fenced = False
         self._points = self._kinematics.chain.points(q_rad)
         self._points_before = self._points[0]
+        self._past.extend([self._points_before] * self._n_past)
         self.target_m = self._kinematics.tcp(q_rad)
         self.yaw_rad = self._home_yaw_rad
         self._is_upright = self._is_solved = False
@@ -150,7 +152,7 @@ class Follower:
                 self._is_due = self._to_come is not None  # targets that come every tick may not put it off for good
                 self._to_come = [*target_m, yaw_rad]
             else:
-                self._tool.aim([*target_m, yaw_rad])
+                self._aim_tool([*target_m, yaw_rad])
             self.target_m, self.yaw_rad = target_m, yaw_rad
             return True
         return self._align(target_m, yaw_rad)
@@ -160,9 +162,17 @@ class Follower:
         if self._is_upright:
             self._take_up_joints()
         chain, most = self._kinematics.chain, self._joint_step_rad
-        self._joints.slow_to(share_of_speed(self.q_rad, q_rad, chain, most, self._envelope.part_step_m))
+        steps_m = self._greatest_steps(chain.tcp(q_rad))
+        self._joints.slow_to(share_of_speed(self.q_rad, q_rad, chain, most, steps_m))
         self._joints.aim(list(q_rad))
         self.target_m = self._kinematics.tcp(q_rad)
+
+    def _greatest_steps(self, to_m: Vec3) -> Vec3:
+        """Return how far parts may go in a tick on the way to a place: low over the table the tool as guarded."""
+        tcp_m, flange_m, elbow_m = self._envelope.part_step_m
+        if is_guarded(self._points[0][0], to_m, self._guard_z_m):
+            tcp_m = min(tcp_m, self._guarded_m_s * self._tick_s)
+        return tcp_m, flange_m, elbow_m
 
     def joints_at(self, place_m: Vec3, yaw_rad: float | None = None, seed_rad: Vec6 | None = None) -> Vec6 | None:
         """Return joints near the present ones that bring the tool to a place; None where none do, or it is tilted.
@@ -211,6 +221,8 @@ class Follower:
         q = self._step_tool() if self._is_upright else _vec6(self._joints.step())
         if q != self.q_rad or q != self.q_before_rad:
             q = self._hold_back(q)
+        else:
+            self._past.append(self._points[0])
         if self._tool.is_failed or self._joints.is_failed:
             self.trouble = "brake"
         self._q_earlier_rad, self.q_before_rad, self.q_rad = self.q_before_rad, self.q_rad, q
@@ -236,9 +248,20 @@ class Follower:
             self.trouble = "unreachable"
             return _vec6(self._joints.step())
 
+    def _aim_tool(self, target: list[float]) -> None:
+        """Go to a place and a turn, at guarded speed where it is low or leads low.
+
+        A target goes at guarded speed there itself; a tool that trails it would catch up at full speed.
+        """
+        x, y, z, _ = self._tool.at
+        at_m, to_m = (x, y, z), (target[0], target[1], target[2])
+        is_slow = is_guarded(at_m, to_m, self._guard_z_m)
+        self._tool.slow_to(guarded_share(at_m, to_m, self._speed_m_s, self._guarded_m_s) if is_slow else 1.0)
+        self._tool.aim(target)
+
     def _take_target(self, target: list[float]) -> None:
         if self._is_due:
-            self._tool.aim(target)
+            self._aim_tool(target)
             self._to_come = None
         self._is_due = True
 
@@ -264,11 +287,11 @@ class Follower:
         chain, now, envelope, ends = self._kinematics.chain, self.q_rad, self._envelope, self._envelope.joints
         steps = (q, now, self.q_before_rad, self._q_earlier_rad)
         is_free, points = is_free_step(
-            steps, self._points_before, self._points, chain.rows, self._bounds, envelope.joint_rows,
-            envelope.fence_rows, self._is_upright,
+            steps, self._points_before, self._points, (self._past[0], self._past[1]), chain.rows, self._bounds,
+            envelope.joint_rows, envelope.fence_rows, self._is_upright,
         )  # fmt: skip
         if is_free:
-            self._points_before, self._points = self._points[0], points
+            self._move_on(points)
             return q
         within = window(now, self.q_before_rad, self._q_earlier_rad, ends)
         wanted = [a - b for a, b in zip(q, now, strict=True)]
@@ -276,77 +299,26 @@ class Follower:
         if not all(map(le, within.low, wanted)) or not all(map(le, wanted, within.high)):
             base = braked(now, self.q_before_rad, self._q_earlier_rad, ends, within)
             share, name = part_way(wanted, base, within.low, within.high), "joint_acceleration"
-        met = self._met(wanted, points)
+        places, is_straight = (self._points_before, self._points, points), self._is_upright
+        met = self._ahead.met(now, wanted, places, (self._past[0], self._past[1]), is_straight=is_straight)
         if met:
             if base is wanted:
                 base = braked(now, self.q_before_rad, self._q_earlier_rad, ends, within)
-            there, ends = chain.points(_moved(now, base)), (self._rest(wanted), self._rest(base))
-            for limit in met:
-                left = self._left(limit, base, there, ends)
-                if left < share:
-                    share, name = left, limit.name
+            left, blamed = self._ahead.left(met, now, self._points, wanted, base, is_straight=is_straight)
+            if left < share:
+                share, name = left, blamed
         if share < 1.0:
             self.held = name, 1.0 - share
             self._is_fenced = self._is_fenced or name in self._fence_names
             q = _moved(now, [b + share * (w - b) for w, b in zip(wanted, base, strict=True)])
             points = chain.points(q)
             self._go_on(q, points[0][0], is_braking_kept=not is_pushed)
-        self._points_before, self._points = self._points[0], points
+        self._move_on(points)
         return q
 
-    def _met(self, steps: list[float], points: Place) -> list[Met]:
-        """Return the limits that steps go at too fast. Joints' ways bend: where a stop would end is looked at too."""
-        now, envelope = self.q_rad, self._envelope
-        fastest = max(max(steps), -min(steps))
-        if fastest <= 0.0:
-            return []
-        lost = brake_share(fastest, envelope)
-        places = (self._points_before, self._points, points)
-        end, floor_m = self._rest(steps), self._tip_min_m
-        met = stops_outside(end, self._lowest_m(end), floor_m, self._least_m, envelope)
-        if self._is_upright:
-            return met + too_fast(now, steps, places, None, lost, envelope)
-        heights_m = (self._lowest_m(self._points), self._lowest_m(points), self._lowest_m(end))
-        met += tips_too_fast(heights_m, floor_m, lost, envelope)
-        return met + too_fast(now, steps, places, end[0], lost, envelope)
-
-    @property
-    def _least_m(self) -> float:
-        """Least gap at which a stop ends inside of a fence."""
-        return -OVERRUN_M if self._is_upright else MARGIN_M
-
-    def _rest(self, steps: list[float]) -> Place:
-        """Return where joints come to rest that take a step and then brake together."""
-        now, fastest = self.q_rad, max(max(steps), -min(steps))
-        if fastest <= 0.0:
-            return self._points
-        far = stretch(brake_share(fastest, self._envelope), self._envelope)
-        return self._kinematics.chain.points(_between(now, _moved(now, steps), far))
-
-    def _left(self, limit: Met, base: list[float], there: Place, ends: tuple[Place, Place]) -> float:
-        """Return how much of the way from a braking arm's step to the one that was wanted a limit leaves.
-
-        Args:
-            limit: the limit.
-            base: the braking arm's step.
-            there: where it leads.
-            ends: where stops from the step that was wanted and from the braking arm's end.
-        """
-        if limit.kind == REST:
-            return share_at_rest(*(self._gap_m(limit.index, end) - self._least_m for end in ends))
-        if limit.kind == TIP:
-            return share_left(limit, self._lowest_m(self._points) - self._lowest_m(there))
-        return share_of_way(limit, base, self._points, there, self._envelope)
-
-    def _gap_m(self, index: int, place: Place) -> float:
-        """Return what is left of a fence, or of the fingertips' height over the table."""
-        if index == TIPS:
-            return self._lowest_m(place) - self._tip_min_m
-        fence = self._envelope.fences[index]
-        return fence.gap(place[0][fence.part])
-
-    def _lowest_m(self, place: Place) -> float:
-        return self._kinematics.chain.lowest_m(place[0][0], place[1])
+    def _move_on(self, points: Place) -> None:
+        self._points_before, self._points = self._points[0], points
+        self._past.append(points[0])
 
     def _go_on(self, q: Vec6, tcp_m: Vec3, *, is_braking_kept: bool = False) -> None:
         """Let the limiter in charge go on from joints that are other than it said."""

@@ -16,6 +16,7 @@ from robot.geometry import between
 from robot.messages import Vec3, Vec6
 from robot.motion.holding import JOINT_RESERVE, MARGIN_M, OVERRUN_M, SPEED_RESERVE, braked_step
 from robot.motion.pacing import RESERVE
+from robot.motion.swinging import swing_step
 
 __all__ = ["Steps", "free_bounds", "is_free_step"]
 
@@ -83,6 +84,15 @@ def _are_parts_slow(before: Points, now: Points, to: Points, bounds: Table) -> b
 
 
 @compiled
+def _are_swings_slow(now: Points, to: Points, past: tuple[Points, Points], bounds: Table) -> bool:
+    for i in range(3):
+        most = SPEED_RESERVE * bounds[1, i]
+        if not _way(now[i], to[i]) <= swing_step(now[i], to[i], (past[0][i], past[1][i]), most):
+            return False
+    return True
+
+
+@compiled
 def _can_stop(now: float, to: float, end: float, bounds: Table, lost: float, onwards: float) -> bool:
     """Return whether a gap suffices to come to rest in, as holding reckons it.
 
@@ -134,6 +144,7 @@ def is_free_step(
     steps: Steps,
     before: Points,
     now: Place,
+    past: tuple[Points, Points],
     rows: Table,
     bounds: Table,
     joints: Table,
@@ -146,6 +157,7 @@ def is_free_step(
         steps: where it leads, and the commands before.
         before: where the command before the last brought them.
         now: where the last one did.
+        past: where they were before and after the step SWING_S ago.
         rows: the chain's, robot.chain.
         bounds: free_bounds.
         joints: the envelope's.
@@ -161,6 +173,7 @@ def is_free_step(
     is_free = (
         _are_ends_far(steps, joints, b, fastest)
         and _are_parts_slow(before, now[0], to[0], b)
+        and _are_swings_slow(now[0], to[0], past, b)
         and (to[1] >= b[2, 1] or to[1] >= now[1])
     )
     if not is_free:

@@ -19,7 +19,10 @@ from robot.safety import Braking
 __all__ = [
     "MARGIN_M",
     "OVERRUN_M",
+    "PART",
+    "PART_NAMES",
     "REST",
+    "SPEED_RESERVE",
     "TIP",
     "TIPS",
     "Met",

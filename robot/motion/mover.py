@@ -66,7 +66,9 @@ class Mover:
         """
         self._approach, self._stops = approach, stops
         self._limits = TargetLimits.of(arm, table_m)
-        self._follower = Follower(arm, envelope=envelope, tick_s=tick_s, tip_min_m=self._limits.tip_min_m)
+        self._follower = Follower(
+            arm, envelope=envelope, tick_s=tick_s, tip_min_m=self._limits.tip_min_m, guard_z_m=self._limits.guard_z_m
+        )
         self._envelope = envelope
         self._contact, self._hard_n = ContactGuard(arm), arm.motion.hard_force_n
         is_swift = tick_s < SWIFT_TICK_S
@@ -176,7 +178,9 @@ class Mover:
             moved = self._contact.reseat(state.tcp_force_n, state.tcp_position_m, commanded_m, follower.target_m)
             if moved is not None:
                 self._note("contact")
-                return self._give_way(moved, state)
+                if not self._contact.is_led_up(state.tcp_force_n, state.tcp_position_m, commanded_m, moved):
+                    return self._give_way(moved, state)
+                follower.aim(moved, follower.yaw_rad)
         if self._way is not None and next(self._way, FOUND) is FOUND:
             self._way = None
         before = follower.q_rad

@@ -40,6 +40,23 @@ def test_a_tool_that_was_told_to_rise_is_not_held_down_by_what_it_still_presses_
     assert guard.reseat((0.0, 0.0, LIMIT + 1.0), TOOL, BELOW, above) == above
 
 
+@pytest.mark.parametrize(
+    ("force_n", "commanded_z_m", "target_z_m", "is_led_up"),
+    [
+        (LIMIT + 1.0, 0.1, 0.12, True),
+        (LIMIT, 0.1, 0.12, False),
+        (LIMIT + 1.0, 0.0995, 0.12, True),
+        (LIMIT + 1.0, 0.0985, 0.12, False),
+        (LIMIT + 1.0, 0.1, 0.1005, False),
+    ],
+)
+def test_a_tool_is_led_up_from_what_pushes_it_up_unless_its_command_is_lower(
+    guard, force_n, commanded_z_m, target_z_m, is_led_up
+):
+    force = (-100.0, 40.0, force_n)
+    assert guard.is_led_up(force, TOOL, (0.4, 0.0, commanded_z_m), (0.4, 0.0, target_z_m)) is is_led_up
+
+
 def test_held_up_a_step_down_is_only_a_probe(guard):
     guard.reseat((0.0, 0.0, LIMIT + 1.0), TOOL, TOOL, BELOW)
     eased, is_eased = guard.ease(TOOL, (0.4, 0.0, 0.08))

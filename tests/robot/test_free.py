@@ -23,6 +23,7 @@ from robot.motion.holding import (
     too_fast,
 )
 from robot.motion.pacing import window
+from robot.motion.swinging import of_swings
 from tests.support.profiles import ARM, envelope
 
 CHAIN, KINEMATICS = ToolChain(ARM), Kinematics(ARM)
@@ -47,6 +48,18 @@ def drawn(rng, held):
     jerk = held.joint_rows[:, 5] * rng.choice([0.0, 0.3, 1.0]) * rng.uniform(-1.1, 1.1, 6)
     before = q - (size - gain)
     return vec(q + size), vec(q), vec(before), vec(before - (size - gain - (gain - jerk)))
+
+
+def resting(places):
+    return places[1][0], places[1][0]
+
+
+def swung(rng, places, held):
+    """Return points before and after a step a while ago: none, or one as fast as it may be in any direction."""
+    now = np.array(places[1][0])
+    far = rng.normal(size=(3, 3))
+    far *= rng.choice([0.0, 0.5, 1.0]) * np.array(held.part_step_m)[:, None] / np.linalg.norm(far, axis=1)[:, None]
+    return tuple(map(vec, now)), tuple(map(vec, now + far))
 
 
 def is_held(steps, held, *, is_straight):
@@ -81,10 +94,11 @@ def test_nothing_holds_a_free_step_back(name, tick_s, is_straight):
         if steps[0] == steps[1]:
             continue
         places = (CHAIN.points(steps[2])[0], CHAIN.points(steps[1]))
+        past = swung(rng, places, held)
         is_free, there = is_free_step(
-            steps, *places, CHAIN.rows, bounds, held.joint_rows, held.fence_rows, is_straight
+            steps, *places, past, CHAIN.rows, bounds, held.joint_rows, held.fence_rows, is_straight
         )  # fmt: skip
-        is_left = not is_held(steps, held, is_straight=is_straight)
+        is_left = not (is_held(steps, held, is_straight=is_straight) or of_swings(places[1][0], there[0], past, held))
         assert is_left or not is_free
         assert there == CHAIN.points(steps[0])
         n_free, n_left = n_free + is_free, n_left + is_left
@@ -103,7 +117,14 @@ def test_a_tool_on_its_way_over_the_table_is_nearly_always_free():
         earlier, before, now, wanted = trail[-4:]
         places = (CHAIN.points(before)[0], CHAIN.points(now))
         n_free += is_free_step(
-            (wanted, now, before, earlier), *places, CHAIN.rows, bounds, held.joint_rows, held.fence_rows, True
+            (wanted, now, before, earlier),
+            *places,
+            resting(places),
+            CHAIN.rows,
+            bounds,
+            held.joint_rows,
+            held.fence_rows,
+            True,
         )[0]
     n_moved = sum(a != b for a, b in pairwise(trail))
     assert n_moved > 30
@@ -124,7 +145,14 @@ def test_joints_on_their_way_near_a_fence_and_low_over_the_table_are_nearly_alwa
         earlier, before, now, wanted = trail[-4:]
         places = (CHAIN.points(before)[0], CHAIN.points(now))
         n_free += is_free_step(
-            (wanted, now, before, earlier), *places, CHAIN.rows, bounds, held.joint_rows, held.fence_rows, False
+            (wanted, now, before, earlier),
+            *places,
+            resting(places),
+            CHAIN.rows,
+            bounds,
+            held.joint_rows,
+            held.fence_rows,
+            False,
         )[0]
         n_near += now != wanted and gap_of.gap(CHAIN.tcp(now)) < held.fence_far_m
     assert n_near > 12
@@ -135,7 +163,7 @@ def test_an_arm_that_holds_still_and_what_is_not_a_number_are_not_free():
     held, home = envelope(0.01), ARM.home_rad
     bounds, place = free_bounds(held, CHAIN, tip_min_m=TIP_MIN_M), CHAIN.points(ARM.home_rad)
     near = vec(v + 1e-4 for v in home)
-    args = (place[0], place, CHAIN.rows, bounds, held.joint_rows, held.fence_rows, True)
+    args = (place[0], place, (place[0], place[0]), CHAIN.rows, bounds, held.joint_rows, held.fence_rows, True)
     assert is_free_step((near, home, home, home), *args)[0]
     assert not is_free_step((home, home, home, home), *args)[0]
     for i in range(6):

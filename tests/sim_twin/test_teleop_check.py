@@ -33,6 +33,8 @@ from sim_twin.readings import Reading
 SHORT = 40
 SPEEDS = ("command_tcp_speed", "command_flange_speed", "command_elbow_speed", "elbow_speed", "command_acceleration")
 GIVEN_WAY = (*SPEEDS, "command_stop_acceleration", "command_stop_jerk")
+FORCES = ("force:fingers-object", "steady_force")
+SWUNG = ("tcp_speed", "flange_speed", "elbow_speed")
 MENDED = (
     pytest.param("attended", 2400, SPEEDS, id="writes that give way to nothing"),
     pytest.param("attended", 721, SPEEDS, id="joints that outran the elbow"),
@@ -49,6 +51,13 @@ MENDED = (
     pytest.param("unattended", 791, ("grip_opening",), id="fingers swung apart, loaded", marks=pytest.mark.slow),
     pytest.param("unattended", 1839, ("grip_opening",), id="fingers swung apart, at a box", marks=pytest.mark.slow),
     pytest.param("unattended", 2337, ("grip_opening",), id="fingers swung apart, circling", marks=pytest.mark.slow),
+    pytest.param("unattended", 2965, ("box:table_top",), id="half a stop past an edge", marks=pytest.mark.slow),
+    pytest.param("unattended", 2772, ("box:table_top",), id="half a stop past the lid", marks=pytest.mark.slow),
+    pytest.param("unattended", 588, FORCES, id="a cylinder met by a tool that caught up", marks=pytest.mark.slow),
+    pytest.param("unattended", 2133, FORCES[1:], id="leaves met by a tool that caught up", marks=pytest.mark.slow),
+    pytest.param("attended", 965, FORCES[1:], id="held against a fence by a cap", marks=pytest.mark.slow),
+    pytest.param("attended", 2908, SWUNG, id="turned round, nominal", marks=pytest.mark.slow),
+    pytest.param("attended", 2986, SWUNG, id="turned round, loaded", marks=pytest.mark.slow),
 )
 """Streams of the batteries, seed 0, and limits that were broken there."""
 
