@@ -97,6 +97,7 @@ class RtdeArm:
         self._runtime, self._speed_fraction = Runtime.STOPPED, 1.0
         """As the last state read told."""
         self._modes, self._mode = (-1, 0), mode_of(-1, 0)
+        self._outputs_read = 0
         self._is_hand_asked = False
 
     # ----------------------------------------------------------------------------------------------------- acquire
@@ -174,6 +175,7 @@ class RtdeArm:
         modes = receive.getRobotMode(), receive.getSafetyStatusBits()
         if modes != self._modes:
             self._modes, self._mode = modes, mode_of(*modes)
+        self._outputs_read = receive.getActualDigitalOutputBits() & ALL_BITS
         x, y, z, rx, ry, rz = receive.getActualTCPPose()
         vx, vy, vz, *_ = receive.getActualTCPSpeed()
         fx, fy, fz, *_ = receive.getActualTCPForce()
@@ -187,7 +189,7 @@ class RtdeArm:
             tcp_force_n=(fx, fy, fz),
             grip=grip,
             digital_in=self._pins.signals_in(receive.getActualDigitalInputBits() & ALL_BITS),
-            digital_out=self._pins.signals_out(receive.getActualDigitalOutputBits() & ALL_BITS),
+            digital_out=self._pins.signals_out(self._outputs_read),
             mode=self._mode,
         )
 
@@ -196,8 +198,8 @@ class RtdeArm:
 
         Raises:
             NotEngagedError: nobody took command, or the arm was stopped since.
-            ArmRefusedError: the program that obeys has ended, the controller did not take it, or somebody has slowed
-                the arm down meanwhile.
+            ArmRefusedError: the program that obeys has ended, the controller did not take it, somebody has slowed the
+                arm down meanwhile, or an output does not follow.
             StaleStateError: the link was cut, the client threw, or it took so long that it may have reconnected.
             WireError: the hand does not answer.
         """
@@ -215,6 +217,12 @@ class RtdeArm:
         untaken = self._command.put(command.digital_out)
         if untaken is not None:
             self._refuse(f"digital output {untaken}")
+        strayed = self._command.strayed(self._outputs_read)
+        if strayed is not None:
+            raise ArmRefusedError(
+                f"digital output {strayed}: expected it as it was asked, it is not: who else switches it? A program, "
+                "or an I/O action of the installation, say"
+            )
         self._ask_hand()
 
     def stop(self) -> bool:
@@ -247,6 +255,8 @@ class RtdeArm:
         if self._receive is None:
             return
         self.stop()
+        if self.links.when_lost is None:
+            self._command.end()
         self._pace.pace_by(None)
         dashboard, self._receive, self._dashboard = self._dashboard, None, None  # see RtdeCommand.drop
         with suppress(RuntimeError):

@@ -117,6 +117,11 @@ class RtdeCommand:
         except RuntimeError as error:
             raise self._thrown("digital outputs", error) from error
 
+    def strayed(self, read: int) -> int | None:
+        """Return the first terminal that does not follow, by what was read of all; see DigitalOutputs."""
+        assert self.outputs is not None, "take made it"
+        return self.outputs.strayed(read, self._pins.output_mask, now_ns=monotonic_ns())
+
     def drop(self, clock: Clock, *, is_in_traceback: bool = False) -> bool:
         """End the program and forget its client: it must never get the chance to go on by itself.
 
@@ -146,6 +151,17 @@ class RtdeCommand:
             with suppress(RuntimeError):
                 control.disconnect()
         return is_ended
+
+    def end(self) -> None:
+        """End the clients that a lost link has left, where this process goes on: they would go on by themselves."""
+        control, self.control = self.control, None
+        outputs, self.outputs = self.outputs, None
+        if outputs is not None:
+            outputs.close()
+        if control is not None:
+            with suppress(RuntimeError):
+                control.disconnect()
+        self._links.forget()
 
     def _thrown(self, what: str, error: RuntimeError) -> StaleStateError:
         """Note that the link is lost, and return the error that says so: a client throws where it cannot reconnect."""

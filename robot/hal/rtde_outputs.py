@@ -8,6 +8,8 @@ __all__ = ["N_OUTPUTS", "DigitalOutputs"]
 
 N_OUTPUTS = 16
 N_STANDARD = 8
+STRAY_NS = 100_000_000
+"""So long a terminal may read otherwise than it was asked: it is on its way, or late. Then somebody else has it."""
 
 
 class DigitalOutputs:
@@ -27,6 +29,7 @@ class DigitalOutputs:
     def __init__(self, address: str, *, bits: int) -> None:
         self._client = RTDEIOInterface(address)
         self.bits = bits
+        self._asked, self._straying, self._since_ns = bits, 0, 0
 
     def put(self, bits: int) -> int | None:
         """Switch the outputs that differ; return the first that the controller did not take, None where it took all."""
@@ -40,6 +43,27 @@ class DigitalOutputs:
                 return i
             self.bits ^= 1 << i
         return None
+
+    def strayed(self, read: int, mask: int, *, now_ns: int) -> int | None:
+        """Return the first terminal that has not been as asked for 100 ms, None where none is.
+
+        The client says only that it sent: an output that the installation keeps for itself does not follow.
+
+        Args:
+            read: the outputs as the controller tells them.
+            mask: those that are driven from here.
+            now_ns: monotonic time.
+        """
+        wrong = (read ^ self.bits) & mask
+        going_on = wrong & self._straying & ~(self.bits ^ self._asked)
+        self._asked = self.bits
+        if not going_on:
+            self._straying, self._since_ns = wrong, now_ns
+            return None
+        self._straying = going_on
+        if now_ns - self._since_ns <= STRAY_NS:
+            return None
+        return (going_on & -going_on).bit_length() - 1
 
     def close(self) -> None:
         """Close the client; the outputs stay as they are. Never raises."""

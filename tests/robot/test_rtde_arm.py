@@ -21,7 +21,7 @@ rtde = pytest.importorskip("robot.hal.rtde")
 
 STALE_NS = rtde.STALE_NS
 CONFIG = load_arm("ur5e")
-DASHBOARD, RTDE = 29999, 30004
+DASHBOARD, RTDE, SECONDARY = 29999, 30004, 30002
 
 
 @pytest.fixture(scope="module")
@@ -223,6 +223,22 @@ def test_an_arm_that_somebody_slows_down_in_command_is_refused(controller, arm, 
             arm.engage()
     finally:
         controller.fault(fault, **off)
+
+
+def test_an_output_that_somebody_else_switches_is_refused_by_its_terminal(controller, arm):
+    arm.engage()
+    with undisturbed():
+        drive(arm, 0.05, 30)
+    with socket.create_connection((controller.host, SECONDARY)) as port:
+        port.sendall(b"sec other():\n  set_standard_digital_out(3, True)\nend\n")
+        with pytest.raises((ArmRefusedError, StaleStateError)) as raised:
+            drive(arm, 0.05, 200)
+        port.sendall(b"sec back():\n  set_standard_digital_out(3, False)\nend\n")
+    arm.stop()
+    with undisturbed():
+        if "who else" not in str(raised.value):
+            raise raised.value
+    assert "digital output 3: " in str(raised.value)
 
 
 TICK_NS = 2_000_000

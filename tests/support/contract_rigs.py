@@ -1,7 +1,7 @@
 """Rigs as the contract suite sees them: how their plants and stations come to be, and what they promise of time."""
 
 import gc
-from contextlib import ExitStack, suppress
+from contextlib import ExitStack
 from functools import cached_property
 
 import msgspec
@@ -193,23 +193,13 @@ class WireWorld:
     def renew(self):
         """Let a failed test be repeated, on another plant and record: one that saw its link stall may be used no more.
 
-        A process of its own would end; here the clients are ended, so that they cannot go on by themselves and keep
-        the registers that the next ones need. To forget them is not enough: whatever tells of the failure holds the
-        frames that it came through, and a client with them; and who watches a link holds its descriptor.
+        A process of its own would end; here closing the arm ends its clients. To forget them is not enough: whatever
+        tells of the failure holds the frames that it came through, and who watches a link holds its descriptor.
         """
         self.recording = None
         plant = self.__dict__.pop("_plant", None)
         if plant is not None:
-            command = plant.arm._command
-            control, outputs = command.control, command.outputs
             plant.arm.close()
-            command.control = command.outputs = None
-            if outputs is not None:
-                outputs.close()
-            if control is not None:
-                with suppress(RuntimeError):
-                    control.disconnect()
-            plant.arm.links.forget()
         gc.collect()  # an error and the frames that it came through hold one another, and a client with them
 
     def close(self):

@@ -87,7 +87,7 @@ def steps(q, pose, up):
         ("readContactDetection", (), None, 0),
         ("stopContactDetection", (), None, 0),
         ("freedriveMode", (), True, 0),
-        ("getFreedriveStatus", (), 0, 0),
+        ("getFreedriveStatus", (), None, 0),
         ("endFreedriveMode", (), True, 0),
         ("teachMode", (), True, 0),
         ("endTeachMode", (), True, 0),
