@@ -47,7 +47,7 @@ def pytest_runtest_protocol(item, nextitem):
 
     An arm counts as lost after 40 ms without a state, and a program as silent after 100 ms without a command: where the
     machine's load alone makes such gaps, a failure says nothing of the plant. How long it was is the kernel's count.
-    What failed must then pass twice running: a failure of the plant's own that comes now and then is not to slip through.
+    What failed must then pass twice running: a failure of the plant's own, now and then, is not to slip through.
     """
     name = getattr(getattr(item, "callspec", None), "params", {}).get("world")
     if name is None or WORLDS[name].is_lock_step:
