@@ -40,7 +40,8 @@ def run_with_a_killed_recorder(folder):
     make_lab(folder, HOST, cell=None)
     (folder / "eight.yaml").write_text(EIGHT)
     process = start(
-        folder, "up", "rig.yaml", "--scenario", "small.yaml", "--out", "up", "--json", "--night", "--hours", "0.1", "--",
+        folder, "up", "rig.yaml", "--scenario", "small.yaml", "--out", "up", "--json", "--night",
+        "--hours", "0.1", "--",
         "--preset", "eight.yaml",
     )  # fmt: skip
     log, goals = folder / "up/logs/supervisor.log", folder / "up/run/goals.csv"
