@@ -76,6 +76,9 @@ class Rig(Section, frozen=True, kw_only=True):
     """Zenoh endpoint where the twin's process listens; with it the arm is held by a servo process of its own."""
     keys: Annotated[str, Meta(min_length=1, max_length=500)] | None = None
     """Folder of certificates (`autotelic keys`) for a bus at tls/HOST:PORT, from the rig's file on."""
+    safeguard_input: Annotated[int, Meta(ge=0, le=7)] | None = None
+    """Configurable input of the controller to which a scanner, mat or door is wired as safeguard stop; nobody checks
+    the wire. Without one a real arm does not run unattended."""
     nodes: tuple[NodeStart, ...] = ()
     """What `autotelic up` starts, in this order."""
     expected: PlantExpected

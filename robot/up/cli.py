@@ -2,7 +2,8 @@
 
 from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
-from typing import Annotated
+from shutil import disk_usage
+from typing import TYPE_CHECKING, Annotated
 
 import msgspec
 import typer
@@ -14,6 +15,10 @@ from config.resolved import Resolved
 from config.sources import read_source
 from robot.stop_request import StopRequest
 
+if TYPE_CHECKING:
+    from robot.up.night_watch import NightWatch
+    from robot.up.summary import Summary
+
 __all__ = ["up"]
 
 
@@ -24,16 +29,25 @@ def up(
     without: Annotated[list[str] | None, typer.Option("--without", help="A node that is left out.")] = None,
     out: Annotated[Path | None, typer.Option(help="Folder for logs and run.  [default: runs/up-RIG]")] = None,
     *,
+    night: Annotated[
+        bool, typer.Option("--night", help="Nobody attends: too many stops end it, or a full disk.")
+    ] = False,
+    hours: Annotated[float, typer.Option(min=0.1, help="With --night: room on the disk is asked for so long.")] = 10.0,
+    alert: Annotated[
+        str, typer.Option(help="With --night: a command that is told, as its last word, how it ended.")
+    ] = "",
     json: Annotated[bool, typer.Option("--json", help="Print a summary as one JSON object at the end.")] = False,
 ) -> None:
     """Start a rig's processes, watch them, start again what ends, and end them on Ctrl-C: the arm first and last.
 
     Words after -- go to the job: `autotelic up virtual_lab -- --epochs 50`. Exit code 0 if nothing went wrong, 3 if
-    something did and was mended, 1 if it was not.
+    something did and was mended, 1 if it was not. With --night OUT/morning.md tells how it went.
     """
     from robot.bus.session import Bus
     from robot.bus.topic import Role
     from robot.up.logs import Logs
+    from robot.up.night import check_night
+    from robot.up.night_watch import NightWatch
     from robot.up.plan import plans_of
     from robot.up.summary import Event
     from robot.up.supervisor import Supervisor
@@ -53,19 +67,35 @@ def up(
         assert found.bus is not None, "a robot node has one"
         return Bus(found.bus, serial=found.expected.serial, role=Role.VIEWER, source="supervisor", keys=found.keys)
 
+    folder.mkdir(parents=True, exist_ok=True)
+    watch = NightWatch(folder, alert=alert, say=lambda line: typer.echo(line, err=True)) if night else None
+    if watch is not None:
+        check_night(found, hours=hours, free_bytes=disk_usage(folder).free)
     logs = Logs(folder / "logs")
-    supervisor = Supervisor(plans, make_bus=make_bus, logs=logs, rig=found.name, tell=tell)
+    supervisor = Supervisor(plans, make_bus=make_bus, logs=logs, rig=found.name, tell=tell, night=watch)
     shown: AbstractContextManager[Live | None] = (
         Live(console=console, refresh_per_second=4) if console.is_terminal else nullcontext()
     )
     with StopRequest() as end, shown as live:
         summary = supervisor.run(end, look=lambda: None if live is None else live.update(status_table(supervisor)))
     logs.close()
+    if watch is not None:
+        _leave_word(watch, supervisor.why_over, summary, folder)
     if json:
         typer.echo(msgspec.json.encode(summary).decode())
     else:
         typer.echo(f"{summary.seconds:.0f} s, {len(summary.events)} events; logs in {summary.logs}", err=True)
     raise typer.Exit(summary.exit_code)
+
+
+def _leave_word(watch: "NightWatch", why_over: str | None, summary: "Summary", folder: Path) -> None:
+    """Write the morning's report and tell whoever is to be told."""
+    from robot.up.morning import morning_report
+
+    budget = watch.budget
+    report = morning_report(summary, budget.stops, n_stops=budget.n, why_over=why_over)
+    (folder / "morning.md").write_text(report, encoding="utf-8")
+    watch.tell(report.splitlines()[0].removeprefix("# ") + (f"; {why_over}" if why_over else ""))
 
 
 def _values(resolved: Resolved, rig: str, scenario: str, folder: Path) -> dict[str, str]:

@@ -16,6 +16,7 @@ from robot.node.stop_caller import StopCaller
 from robot.up.child import Child
 from robot.up.clocks import ClockAsker, ClockBook
 from robot.up.logs import Logs
+from robot.up.night_watch import NightWatch
 from robot.up.plan import Backoff, NodePlan
 from robot.up.summary import Event, NodeSummary, Summary, Worst
 from robot.up.watch import GONE_S, SILENT_S, HealthBook
@@ -55,12 +56,14 @@ class Supervisor:
         logs: where words go.
         rig: its name.
         tell: told of every event.
+        night: watches over a run that nobody attends; None where somebody does.
         now_s: the monotonic clock.
     """
 
     def __init__(
         self, plans: tuple[NodePlan, ...], *, make_bus: Callable[[], Bus], logs: Logs, rig: str,
-        tell: Callable[[Event], object] = lambda _: None, now_s: Callable[[], float] = monotonic,
+        tell: Callable[[Event], object] = lambda _: None, night: NightWatch | None = None,
+        now_s: Callable[[], float] = monotonic,
     ) -> None:  # fmt: skip
         self.nodes = {plan.name: _Node(plan) for plan in plans}
         self._make_bus, self._logs, self._rig, self._tell, self._now_s = make_bus, logs, rig, tell, now_s
@@ -69,6 +72,9 @@ class Supervisor:
         self._bus: Bus | None = None
         self._stops: StopCaller | None = None
         self.book = HealthBook(tuple(self.nodes), clock=clock_number(), now_s=now_s)
+        self._night = night
+        self.why_over: str | None = None
+        """Why a run that nobody attends ended by itself."""
         self.clocks = ClockBook()
         self._clock_asker: ClockAsker | None = None
         self.events: list[Event] = []
@@ -85,7 +91,7 @@ class Supervisor:
         """
         try:
             if self._start_all(should_end, look):
-                while not should_end() and not self._is_over():
+                while not should_end() and not self._is_over() and not self._is_spent():
                     self._look()
                     look()
                     sleep(LOOK_S)
@@ -134,12 +140,26 @@ class Supervisor:
             return
         self._bus, self._stops = bus, StopCaller(bus, by="the supervisor")
         self._clock_asker = ClockAsker(bus, self.clocks)
+        if self._night is not None:
+            self._night.listen(bus, self._seconds)
         self._health = bus.subscriber(HEALTH, lambda received: self.book.take(received))
 
     # --------------------------------------------------------------------------------------------------------- watch
 
     def _is_over(self) -> bool:
         return any(node.is_over for node in self.nodes.values())
+
+    def _is_spent(self) -> bool:
+        """Whether a run that nobody attends has to end; the arm is stopped first, as at every end."""
+        if self._night is not None and self.why_over is None:
+            self.why_over = self._night.why_over(self._seconds())
+            if self.why_over is not None:
+                robot = next(node for node in self.nodes.values() if node.plan.kind == "robot")
+                self._note(robot, f"night: {self.why_over}: the run ends", Worst.FAILED)
+        return self.why_over is not None
+
+    def _seconds(self) -> float:
+        return self._now_s() - self._begun_s
 
     def _look(self) -> None:
         for node in self.nodes.values():

@@ -23,7 +23,8 @@ ROOT = Path(__file__).parents[3]
 ARMS, LEARNERS, ARM = "192.168.1.5", "192.168.1.6", "127.0.0.80"
 ENDLESS = """\
 name: endless
-experiment: {epochs: 1000, trials: 1, steps: 200, evaluate_every: 500, test_epochs: 1, checkpoint_every: 1, void_limit: 500}
+experiment: {epochs: 1000, trials: 1, steps: 200, evaluate_every: 500, test_epochs: 1, checkpoint_every: 1,
+  void_limit: 500}
 """
 SLICE_S, STILL_RAD_S, MOVES_RAD_S = 0.002, 0.01, 0.15
 REST_S = 0.8

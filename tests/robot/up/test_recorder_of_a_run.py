@@ -40,7 +40,9 @@ def run_with_a_killed_recorder(folder):
     make_lab(folder, HOST, cell=None)
     (folder / "eight.yaml").write_text(EIGHT)
     process = start(
-        folder, "up", "rig.yaml", "--scenario", "small.yaml", "--out", "up", "--json", "--", "--preset", "eight.yaml"
+        folder, "up", "rig.yaml", "--scenario", "small.yaml", "--out", "up", "--json", "--night",
+        "--hours", "0.1", "--",
+        "--preset", "eight.yaml",
     )  # fmt: skip
     log, goals = folder / "up/logs/supervisor.log", folder / "up/run/goals.csv"
     try:
@@ -85,6 +87,13 @@ def test_the_arm_goes_on_without_its_recorder_which_is_started_again(run):
     _, _, said, _, _ = run
     assert "recorder: killed by signal 9" in said
     assert "arm is stopped" not in said
+
+
+def test_a_run_that_nobody_attended_leaves_a_report(run):
+    told = (run[0] / "up/morning.md").read_text()
+    assert told.startswith("# small_lab: 0.0 h, something went wrong and was mended\n")
+    assert "* stops: 0" in told
+    assert "| recorder | 2 |" in told
 
 
 def test_a_killed_recorder_loses_a_second_at_most_of_what_all_processes_wrote(run):
