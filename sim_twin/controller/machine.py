@@ -17,7 +17,8 @@ from sim_twin.plant import TwinWorld
 __all__ = ["Machine"]
 
 GRAVITY_M_S2 = 9.81
-N_STEADY = 50
+N_STEADY = 250
+"""UR: 500 ms."""
 _SLICE_US = round(SLICE_S * 1e6)
 
 
@@ -38,10 +39,12 @@ class Machine:
         posted: Events that a program brought about; taken at the end of its slice.
         payload_inertia: (Ixx, Iyy, Izz, Ixy, Ixz, Iyz), kg m², as told; the twin's dynamics do not use it.
         gravity: Direction and size as told (m/s², base axes); likewise.
-        waypoint: UR pose of the last move's target; None before the first.
+        waypoint: UR pose of the last move's target; None before the first, and where a motion has none.
+        n_moves: Moves along a path that programs are in.
         force_damping: Of the force modes to come.
         force_gain: Likewise.
         external_wrench: What a client writes as force and torque of its own sensor.
+        is_shut_down: A program switched the controller off; who runs it looks.
         n_standing: Slices since the arm last moved.
         execution_s: What the slice before cost, where somebody measures it.
     """
@@ -58,9 +61,11 @@ class Machine:
         self.payload_inertia = [0.0] * 6
         self.gravity = [0.0, 0.0, GRAVITY_M_S2]
         self.waypoint: Array | None = None
+        self.n_moves = 0
         self.force_damping, self.force_gain = 0.025, 1.0
         self.external_wrench = [0.0] * 6
         self.n_standing = 0
+        self.is_shut_down = False
         self.execution_s = 0.0
         self._acceleration_slice = self._target_slice = -1
         self._acceleration = (0.0, 0.0, 0.0)

@@ -235,7 +235,7 @@ class ControllerServer:
         gc.set_threshold(*gc.get_threshold()[:2], SEARCH_NEVER)
         when_ready()
         pacer = Pacer(period_ns=round(SLICE_S * 1e9))
-        while not is_over() and not self.robot.panel.is_shut_down:
+        while not (is_over() or self.robot.panel.is_shut_down or self.robot.machine.is_shut_down):
             self.tick()
             self.faults.delay(self._control.poll)
             pacer.wait()

@@ -17,5 +17,6 @@ def control_builtins(machine: Machine) -> Builtins:
     def powerdown() -> Value:
         machine.post(Event.POWER_OFF)
         machine.post(Event.STOP)
+        machine.is_shut_down = True
 
     return {"powerdown": powerdown, "protective_stop": protective_stop}

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from sim_twin.controller.builtins.moving import as_pose
 from sim_twin.controller.machine import Machine
 from sim_twin.controller.motion import ForceKind, ForceTask
 from sim_twin.controller.script import Builtins, Value
@@ -42,7 +43,7 @@ def force_builtins(machine: Machine) -> Builtins:
         drive.zero_force()
 
     def get_tcp_force() -> Value:
-        return drive.measured.wrench.tolist()
+        return as_pose(drive.measured.wrench)
 
     def force() -> Value:
         return float(np.linalg.norm(drive.measured.wrench[:3]))

@@ -8,7 +8,8 @@ from sim_twin.controller.motion import KinematicsError
 from sim_twin.controller.motion.poses import Array
 from sim_twin.controller.pose import Pose
 from sim_twin.controller.script import Builtins, Value
-from sim_twin.controller.script.builtins import number, pose, vector
+from sim_twin.controller.script.builtins import number, vector
+from sim_twin.controller.script.builtins import pose as as_given
 
 __all__ = ["kinematics_builtins"]
 
@@ -21,7 +22,7 @@ def kinematics_builtins(machine: Machine) -> Builtins:
     kinematics, core = drive.kinematics, drive.core
 
     def tool(tcp: Value) -> Array:
-        return core.tcp_offset if tcp is None or tcp == _ACTIVE else np.array(pose(tcp))
+        return core.tcp_offset if tcp is None or tcp == _ACTIVE else np.array(as_given(tcp))
 
     def get_forward_kin(q: Value = None, tcp: Value = None) -> Value:
         joints = drive.measured.q_rad if q is None else np.array(vector(q, 6))
@@ -37,21 +38,23 @@ def kinematics_builtins(machine: Machine) -> Builtins:
         number(maxPositionError)
         number(maxOrientationError)
         near = drive.measured.q_rad if qnear is None else np.array(vector(qnear, 6))
-        return as_list(kinematics.inverse(vector(pose(x), 6), near, tool(tcp)))
+        return as_list(kinematics.inverse(vector(as_given(x), 6), near, tool(tcp)))
 
     def get_inverse_kin_has_solution(
-        x: Value,
+        pose: Value,
         qnear: Value = None,
         maxPositionError: Value = 1e-10,  # noqa: N803, ARG001 - UR's name
         maxOrientationError: Value = 1e-10,  # noqa: N803, ARG001 - UR's name
         tcp: Value = _ACTIVE,
     ) -> Value:
         near = drive.measured.q_rad if qnear is None else np.array(vector(qnear, 6))
-        return kinematics.has_solution(vector(pose(x), 6), near, tool(tcp))
+        return kinematics.has_solution(vector(as_given(pose), 6), near, tool(tcp))
 
-    def is_within_safety_limits(pose: Value) -> Value:
+    def is_within_safety_limits(position: Value, qNear: Value = None) -> Value:  # noqa: N803 - UR's name
+        near = drive.measured.q_rad if qNear is None else np.array(vector(qNear, 6))
+        aim = vector(position, 6)
         try:
-            joints = np.array(core.joints_of(pose) if type(pose) is Pose else vector(pose, 6))
+            joints = kinematics.inverse(aim, near, core.tcp_offset) if type(position) is Pose else np.array(aim)
         except KinematicsError:
             return False
         limits = drive.limits

@@ -1,5 +1,8 @@
 """movej, movel, movep, movec, servoc, optimovej, optimovel."""
 
+from collections.abc import Callable
+from functools import wraps
+
 import numpy as np
 
 from sim_twin.controller.builtins.moving import in_slices
@@ -54,6 +57,7 @@ def move_builtins(machine: Machine) -> Builtins:
 
     def servoc(pose: Value, a: Value = 1.2, v: Value = 0.25, r: Value = 0) -> Motion:
         goal, is_pose = aim(pose)
+        machine.waypoint = None
         return moves.servoc(goal, number(a), number(v), number(r), is_pose=is_pose)
 
     def optimovej(q: Value, a: Value = 0.3, v: Value = 0.3, r: Value = 0) -> Motion:
@@ -66,10 +70,25 @@ def move_builtins(machine: Machine) -> Builtins:
         fastest = _share(v) * machine.drive.limits.tool_speed_m_s
         return moves.movel(goal, _share(a) * OPTIMAL_M_S2, fastest, 0.0, number(r), is_pose=is_pose)
 
-    return {name: in_slices(move) for name, move in {
+    return {name: in_slices(_counted(machine, move)) for name, move in {
         "movej": movej, "movel": movel, "movep": movep, "movec": movec, "servoc": servoc,
         "optimovej": optimovej, "optimovel": optimovel,
     }.items()}  # fmt: skip
+
+
+def _counted(machine: Machine, begin: Callable[..., Motion]) -> Callable[..., Motion]:
+    """Return a move that counts among those under way for as long as a program is in it."""
+
+    @wraps(begin)
+    def move(*positional: Value, **keywords: Value) -> Motion:
+        motion = begin(*positional, **keywords)
+        machine.n_moves += 1
+        try:
+            yield from motion
+        finally:
+            machine.n_moves -= 1
+
+    return move
 
 
 def _share(value: Value) -> float:

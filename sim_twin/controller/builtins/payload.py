@@ -2,8 +2,9 @@
 
 from sim_twin.controller.builtins.moving import as_list, as_pose
 from sim_twin.controller.machine import Machine
+from sim_twin.controller.motion import SLICE_S
 from sim_twin.controller.script import Builtins, Value
-from sim_twin.controller.script.builtins import number, vector
+from sim_twin.controller.script.builtins import number, slices_in, vector
 from sim_twin.controller.script.builtins import pose as as_given
 
 __all__ = ["payload_builtins"]
@@ -12,6 +13,10 @@ __all__ = ["payload_builtins"]
 def payload_builtins(machine: Machine) -> Builtins:
     """Return setters and getters of tool, payload and gravity."""
     return {**_tool(machine), **_payload_setters(machine), **_payload_getters(machine), **_gravity(machine)}
+
+
+MOST_INERTIA_KG_M2 = 133.0
+"""Of any component (e-Series script directory)."""
 
 
 def _tool(machine: Machine) -> Builtins:
@@ -32,19 +37,24 @@ def _payload_setters(machine: Machine) -> Builtins:
     def known_cog() -> list[float]:
         return list(drive.payload[1])
 
+    def tell(mass_kg: float, cog_m: list[float], n_transition: int = 0) -> None:
+        drive.set_payload(mass_kg, cog_m, n_transition=n_transition)
+        machine.payload_inertia = [0.0] * 6
+
+    # The default is a guess: a robot takes the tool centre point, and goes on doing so as that moves.
     def set_payload(m: Value, cog: Value = None) -> Value:
-        drive.set_payload(number(m), known_cog() if cog is None else vector(cog, 3))
+        tell(number(m), known_cog() if cog is None else vector(cog, 3))
 
     def set_payload_mass(m: Value) -> Value:
-        drive.set_payload(number(m), known_cog())
+        tell(number(m), known_cog())
 
     def set_payload_cog(CoG: Value) -> Value:  # noqa: N803 - UR's name
-        drive.set_payload(drive.payload[0], vector(CoG, 3))
+        tell(drive.payload[0], vector(CoG, 3))
 
     def set_target_payload(m: Value, cog: Value, inertia: Value = None, transition_time: Value = 0) -> Value:
-        number(transition_time)
-        drive.set_payload(number(m), vector(cog, 3))
-        machine.payload_inertia = [0.0] * 6 if inertia is None else vector(inertia, 6)
+        inertia_kg_m2 = [0.0] * 6 if inertia is None else _inertia(inertia)
+        tell(number(m), vector(cog, 3), slices_in(number(transition_time), SLICE_S))
+        machine.payload_inertia = inertia_kg_m2
 
     return {
         "set_payload": set_payload,
@@ -52,6 +62,16 @@ def _payload_setters(machine: Machine) -> Builtins:
         "set_payload_mass": set_payload_mass,
         "set_target_payload": set_target_payload,
     }
+
+
+def _inertia(value: Value) -> list[float]:
+    """Take a payload's inertia: no component beyond UR's limit, none about an axis below zero."""
+    found = vector(value, 6)
+    if min(found[:3]) < 0.0 or max(map(abs, found)) > MOST_INERTIA_KG_M2:
+        raise ValueError(
+            f"expected an inertia within {MOST_INERTIA_KG_M2:g} kg m², Ixx, Iyy and Izz of 0 or more, got {found}"
+        )
+    return found
 
 
 def _payload_getters(machine: Machine) -> Builtins:

@@ -32,7 +32,7 @@ def _measured(machine: Machine) -> Builtins:
         return as_pose(drive.measured.tcp_pose)
 
     def get_actual_tcp_speed() -> Value:
-        return as_list(drive.measured.tcp_speed)
+        return as_pose(drive.measured.tcp_speed)
 
     def get_actual_tool_flange_pose() -> Value:
         return as_pose(drive.kinematics.pose(drive.measured.q_rad))
@@ -74,10 +74,13 @@ def _asked(machine: Machine) -> Builtins:
         return as_pose(core.target_tool()[0])
 
     def get_target_tcp_speed() -> Value:
-        return as_list(core.target_tool()[1])
+        return as_pose(core.target_tool()[1])
 
     def get_target_waypoint() -> Value:
-        return as_pose(core.target_tool()[0] if machine.waypoint is None else machine.waypoint)
+        # A move that has returned within its blend still goes on; what another motion leaves has no anchor.
+        is_blending = core.tail is not None and core.tail.anchor_rad is not None
+        waypoint = machine.waypoint if machine.n_moves or is_blending else None
+        return as_pose(core.target_tool()[0] if waypoint is None else waypoint)
 
     return {
         "get_target_joint_accelerations": get_target_joint_accelerations,

@@ -28,9 +28,7 @@ from sim_twin.controller.motion.stopping import stop_path
 from sim_twin.controller.motion.wrench import (
     GRAVITY_M_S2,
     NM_PER_A,
-    ContactWrench,
-    is_same_payload,
-    payload_bias,
+    ForceSensor,
 )
 from sim_twin.controller.states import MotionOrder
 from sim_twin.plant import TwinWorld
@@ -95,11 +93,7 @@ class TwinDrive:
         self._gains = model.actuator_gainprm[self._controls].copy()
         self._biases = model.actuator_biasprm[self._controls].copy()
         self._lag_s = servo_lag_s(model, int(self._controls[0]), tick_s=world.tick_s)
-        self._contacts = ContactWrench(model)
-        tool = world.arm.tool
-        self._real_payload = (tool.mass_kg, np.array(tool.com_m))
-        self._payload = self._real_payload
-        self._zero = np.zeros(6)
+        self._sensor = ForceSensor(model, (world.arm.tool.mass_kg, np.array(world.arm.tool.com_m)))
         self.motions = Motions(
             world.arm, kinematics=self.kinematics, q_rad=data.qpos[:6].copy(), servo_lag_s=self._lag_s
         )
@@ -190,8 +184,13 @@ class TwinDrive:
 
     # ------------------------------------------------------------------------------------------------------ sensing
 
-    def set_payload(self, mass_kg: float, cog_m: Sequence[float] = (0.0, 0.0, 0.0)) -> None:
-        """Tell the controller what hangs on the flange; what is not so biases the force.
+    def set_payload(self, mass_kg: float, cog_m: Sequence[float] = (0.0, 0.0, 0.0), *, n_transition: int = 0) -> None:
+        """Tell the controller what hangs on the flange; the force sensor's next reading is nothing, as on a robot.
+
+        Args:
+            mass_kg: How heavy it is.
+            cog_m: Its centre of gravity, flange frame.
+            n_transition: Slices after which the sensor is zeroed once more.
 
         Raises:
             ValueError: a mass below zero, or mass or place beyond anything that an arm carries.
@@ -202,7 +201,9 @@ class TwinDrive:
             )
         if not (np.abs(cog_m) <= MOST_TOLD_M).all():
             raise ValueError(f"payload: expected a centre of gravity within {MOST_TOLD_M:g} m, got {[*cog_m]}")
-        self._payload = (mass_kg, np.array(cog_m, dtype=np.float64))
+        next_slice = self.n_slices + 1
+        known = (mass_kg, np.array(cog_m, dtype=np.float64))
+        self._sensor.tell(known, zeroing=(next_slice, next_slice + n_transition))
 
     def hang(self, extra_kg: float) -> None:
         """Let so much more hang on the flange than the tool, without telling the controller; 0 takes it off.
@@ -213,23 +214,27 @@ class TwinDrive:
         if not 0.0 <= extra_kg <= MOST_EXTRA_KG:
             raise ValueError(f"payload: expected 0 to {MOST_EXTRA_KG:g} kg more, got {extra_kg}")
         tool = self.world.arm.tool
-        self._real_payload = (tool.mass_kg + extra_kg, np.array(tool.com_m))
+        self._sensor.hang((tool.mass_kg + extra_kg, np.array(tool.com_m)))
         self.world.data.xfrc_applied[self.world.model.body("tool").id, 2] = -GRAVITY_M_S2 * extra_kg
 
     @property
     def payload(self) -> tuple[float, Array]:
         """Mass (kg) and centre of gravity (m, flange frame) as told."""
-        return self._payload
+        return self._sensor.told
 
     def zero_force(self) -> None:
         """Take what the force sensor reads now as nothing (zero_ftsensor)."""
-        self._zero = self._zero + self.measured.wrench
+        self._sensor.zero(self.measured.wrench)
 
     def joint_history(self, n_slices: int) -> Array:
-        """Return the joints measured some slices ago; the oldest kept where that is too long ago.  () -> (6,)"""
-        if not self._history:
-            return self.measured.q_rad
-        return self._history[max(-len(self._history), -1 - max(0, n_slices))]
+        """Return the joints measured some slices ago, the first of all where there were fewer.  () -> (6,)
+
+        Raises:
+            ValueError: that is longer ago than they are kept.
+        """
+        if not 0 <= n_slices < N_HISTORY:
+            raise ValueError(f"expected 0 to {N_HISTORY - 1} time steps, got {n_slices}")
+        return self._history[max(-len(self._history), -1 - n_slices)] if self._history else self.measured.q_rad
 
     # -------------------------------------------------------------------------------------------------- one slice
 
@@ -375,9 +380,8 @@ class TwinDrive:
         q, qd = data.qpos[:6].copy(), data.qvel[:6].copy()
         T_bt, J = self.kinematics.forward_and_jacobian(q, self.core.T_ft)
         tool_m = T_bt[:3, 3]
-        wrench = self._contacts.at(model, data, tool_m) - self._zero
-        if not is_same_payload(self._payload, self._real_payload):
-            wrench += payload_bias(self.kinematics.forward(q), tool_m, self._real_payload, self._payload)
+        T_bf = self.kinematics.forward(q) if self._sensor.is_biased else None
+        wrench = self._sensor.read(model, data, tool_m, T_bf, self.n_slices)
         velocity = flange_velocity(T_bt, J @ qd, self.core.T_ft)
         acceleration, self._velocity = (velocity - self._velocity) / SLICE_S, velocity
         # Brakes hold without power, and the twin carries the weight whatever does.

@@ -1,16 +1,30 @@
 """What the arm's sensors say of forces: contacts of the tool, weight that is not known, torques as currents."""
 
+from typing import TypeAlias
+
 import mujoco
 import numpy as np
 
 from sim_twin.controller.motion.poses import Array
 
-__all__ = ["NM_PER_A", "ContactWrench", "cross", "is_same_payload", "payload_bias"]
+__all__ = [
+    "GRAVITY_M_S2",
+    "NM_PER_A",
+    "ContactWrench",
+    "ForceSensor",
+    "Payload",
+    "cross",
+    "is_same_payload",
+    "payload_bias",
+]
 
 NM_PER_A = np.array([13.6, 13.6, 13.6, 9.1, 9.1, 9.1])
 """Joint torque over motor current: a torque constant near 0.135 (0.09) Nm/A behind a gear of 101, as published
 identifications of the UR5's large (small) joints have it; recalled, not measured."""
 GRAVITY_M_S2 = 9.81
+Payload: TypeAlias = tuple[float, Array]
+"""Mass (kg) and centre of gravity (m, flange frame)."""
+_NEVER = -1
 
 
 class ContactWrench:
@@ -43,12 +57,64 @@ class ContactWrench:
         return total
 
 
-def is_same_payload(one: tuple[float, Array], other: tuple[float, Array]) -> bool:
-    """Return whether two payloads, (kg, centre of gravity), are one: then a sensor has no bias."""
+class ForceSensor:
+    """What is read at the tool: contacts, weight that nobody told of, less what was zeroed.
+
+    Args:
+        model: The twin's.
+        payload: What hangs on the flange, as the controller knows too.
+    """
+
+    def __init__(self, model: mujoco.MjModel, payload: Payload) -> None:
+        self._contacts = ContactWrench(model)
+        self._real = self.told = payload
+        self._zero = np.zeros(6)
+        self._zeroing = (_NEVER, _NEVER)
+
+    @property
+    def is_biased(self) -> bool:
+        """The payload is not the one that was told."""
+        return not is_same_payload(self.told, self._real)
+
+    def tell(self, payload: Payload, *, zeroing: tuple[int, int]) -> None:
+        """Take a payload as known, and the readings in two slices to come as nothing."""
+        self.told, self._zeroing = payload, zeroing
+
+    def hang(self, payload: Payload) -> None:
+        """Let another payload hang on the flange than was told."""
+        self._real = payload
+
+    def zero(self, wrench: Array) -> None:
+        """Take what was read as nothing from the next reading on.  (6,)"""
+        self._zero = self._zero + wrench
+
+    def read(
+        self, model: mujoco.MjModel, data: mujoco.MjData, point_m: Array, T_bf: Array | None, n_slices: int
+    ) -> Array:
+        """Return force and torque about a point, base axes.  (3,), (4, 4) -> (6,)
+
+        Args:
+            model: The twin's.
+            data: Likewise.
+            point_m: The tool centre point.
+            T_bf: The flange, needed where the sensor is biased.
+            n_slices: Which slice it is.
+        """
+        wrench = self._contacts.at(model, data, point_m) - self._zero
+        if T_bf is not None:
+            wrench += payload_bias(T_bf, point_m, self._real, self.told)
+        if n_slices in self._zeroing:
+            self.zero(wrench)
+            return np.zeros(6)
+        return wrench
+
+
+def is_same_payload(one: Payload, other: Payload) -> bool:
+    """Return whether two payloads are one: then a sensor has no bias."""
     return one[0] == other[0] and one[1].tolist() == other[1].tolist()
 
 
-def payload_bias(T_bf: Array, point_m: Array, real: tuple[float, Array], known: tuple[float, Array]) -> Array:
+def payload_bias(T_bf: Array, point_m: Array, real: Payload, known: Payload) -> Array:
     """Return what a sensor reads too much because the payload is not the one it was told.
 
     Args:

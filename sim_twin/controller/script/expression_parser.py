@@ -6,6 +6,7 @@ from typing import NoReturn
 from sim_twin.controller.script.arithmetic import int32
 from sim_twin.controller.script.errors import ScriptSyntaxError
 from sim_twin.controller.script.lexer import Token, line_at
+from sim_twin.controller.script.spelling import held
 from sim_twin.controller.script.syntax import (
     Binary,
     Call,
@@ -197,7 +198,7 @@ class ExpressionParser:
             return Constant(_number(text))
         if kind == "string":
             self.advance()
-            return Constant(text[1:-1])
+            return Constant(held(text[1:-1]))
         if kind not in ("True", "False"):
             self.fail("a value")
         self.advance()

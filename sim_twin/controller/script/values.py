@@ -19,6 +19,7 @@ __all__ = [
     "item",
     "joined",
     "member",
+    "shown",
     "stored",
     "stored_member",
     "text_of",
@@ -132,11 +133,13 @@ def joined(first: str, second: str) -> str:
 
 
 def truth(value: Value) -> bool:
-    """Return whether a condition holds: a bool, or a number that is not zero."""
+    """Return whether a condition holds: a bool, a number that is not zero, or a string that is not empty."""
     if value is True or value is False:
         return value
     if type(value) is int or type(value) is float:
         return value != 0
+    if type(value) is str:
+        return value != ""
     raise ScriptRuntimeError(f"expected True or False, got {described(value)}; compare it with something")
 
 
@@ -181,7 +184,7 @@ def stored_member(owner: Value, name: str, value: Value) -> Value:
 
 
 def text_of(value: Value) -> str:
-    """Return what to_str and textmsg print: six significant digits, poses as p[...].
+    """Return what textmsg, popups and sockets print: six significant digits, poses as p[...].
 
     Raises:
         ScriptRuntimeError: it is longer than a string may be.
@@ -229,12 +232,17 @@ def _too_long() -> ScriptRuntimeError:
     return ScriptRuntimeError(f"the string is too long, expected at most {MAX_CHARACTERS} characters")
 
 
+def shown(text: str) -> str:
+    """Return a script's string, a character for each byte, as people read it."""
+    return text if text.isascii() else text.encode("latin-1", "replace").decode("utf-8", "replace")
+
+
 def described(value: Value) -> str:
     """Say in a message what a value is."""
     if value is None:
         return "nothing"
     if type(value) is str:
-        return f"the string '{value[:_N_SHOWN]}'"
+        return f"the string '{shown(value[:_N_SHOWN])}'"
     pieces: list[str] = []
     _write(value, pieces, _N_SHOWN)
     return f"the {_KINDS.get(type(value), 'value')} {''.join(pieces)[:_N_SHOWN]}"

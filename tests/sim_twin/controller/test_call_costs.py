@@ -26,7 +26,7 @@ BEFORE = """
  s = "xxxxxxxxxxxxxxxx"
  i = 0
  while i < 11:
-  s = str_cat(s, s)
+  s = s + s
   i = i + 1
   sync()
  end
@@ -85,18 +85,17 @@ CALLS = {
     "speedl": "speedl([0, 0, 0.001, 0, 0, 0], 1, 0)",
     "stopj": "stopj(2)",
     "stopl": "stopl(2)",
+    "str_cat": 'x = str_cat(1.2345e300, "xxxx")',
     "textmsg": "textmsg(s, s)",
     "to_num": 'x = to_num("-123456.789e-300")',
+    "to_str": "x = to_str(p[1e150, 1e150, 1e150, 1e150, 1e150, 1e150])",
     "tool_contact": "x = tool_contact([0, 0, 1])",
     "wrench_trans": f"x = wrench_trans(frame, {SIX})",
 }
 LONG = (
     "textmsg(numbers)",
     "textmsg(mixed)",
-    "x = to_str(numbers)",
-    "x = to_str(mixed)",
     "popup(numbers)",
-    "x = str_cat(numbers, 1)",
 )
 
 

@@ -218,7 +218,7 @@ def test_each_builtin_that_moves_leads_where_it_should(ran):
 def test_force_is_zeroed_told_and_complied_with(ran):
     robot, _, told = ran
     assert np.linalg.norm(told["force_zeroed"][:3]) < 0.5
-    assert np.linalg.norm(told["force_payload_1kg"][:3]) == pytest.approx(9.8, abs=1.0)
+    assert np.linalg.norm(told["force_payload_1kg"][:3]) < 0.5
     assert np.linalg.norm(told["force_zeroed_again"][:3]) < 0.5
     assert told["after_force"][2] - told["before_force"][2] > 2e-3
     assert robot.machine.force_damping == 0.05

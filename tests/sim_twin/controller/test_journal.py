@@ -11,7 +11,7 @@ FLOOD = """def f():
  s = "0123456789abcdef"
  i = 0
  while i < 11:
-  s = str_cat(s, s)
+  s = s + s
   i = i + 1
  end
  while True:

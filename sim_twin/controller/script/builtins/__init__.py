@@ -21,6 +21,7 @@ from sim_twin.controller.script.builtins.lists import LISTS
 from sim_twin.controller.script.builtins.maths import MATHS
 from sim_twin.controller.script.builtins.poses import POSES
 from sim_twin.controller.script.builtins.sockets import Sockets
+from sim_twin.controller.script.builtins.strings import STRINGS
 from sim_twin.controller.script.builtins.waiting import Messages, Popup, message_builtins, slices_in, time_builtins
 from sim_twin.controller.script.code import Builtins
 
@@ -44,4 +45,4 @@ __all__ = [
     "vector",
 ]
 
-PURE: Builtins = {**MATHS, **LISTS, **POSES}
+PURE: Builtins = {**MATHS, **LISTS, **STRINGS, **POSES}

@@ -7,8 +7,9 @@ import numpy as np
 
 from sim_twin.controller.pose import Pose, pose_inv
 from sim_twin.controller.script.arithmetic import int32
-from sim_twin.controller.script.builtins.arguments import matrix, number, numbers
+from sim_twin.controller.script.builtins.arguments import matrix, number, numbers, values
 from sim_twin.controller.script.code import Builtins
+from sim_twin.controller.script.spelling import n_characters
 from sim_twin.controller.script.values import Value, described
 
 __all__ = ["MATHS"]
@@ -32,9 +33,15 @@ def _atan2(x: Value, y: Value) -> Value:
 
 def _log(b: Value, f: Value) -> Value:
     base, given = number(b), number(f)
-    if not (base > 0 and base != 1 and given > 0):
-        raise ValueError(f"expected a base and a number above 0, the base not 1, got {described(b)}, {described(f)}")
-    return math.log(given) / math.log(base)
+    if not (base >= 0 and base != 1 and given >= 0):
+        raise ValueError(
+            f"expected a base and a number of 0 or more, the base not 1, got {described(b)}, {described(f)}"
+        )
+    return _ln(given) / _ln(base)
+
+
+def _ln(number: float) -> float:
+    return math.log(number) if number else -math.inf
 
 
 def _pow(base: Value, exponent: Value) -> Value:
@@ -53,8 +60,20 @@ def _norm(a: Value) -> Value:
     return math.hypot(*numbers(a))
 
 
+def _d2r(d: Value) -> Value:
+    return math.radians(number(d))
+
+
+def _r2d(r: Value) -> Value:
+    return math.degrees(number(r))
+
+
 def _transpose(m: Value) -> Value:
-    return [list(column) for column in zip(*matrix(m), strict=True)]
+    """Turn rows into columns; an array is a row, and what has one row becomes an array."""
+    if all(type(part) is not list for part in values(m)):
+        return [[part] for part in numbers(m)]
+    columns: list[list[Value]] = [list(column) for column in zip(*matrix(m), strict=True)]
+    return columns[0] if len(columns) == 1 else [*columns]
 
 
 def _inv(m: Value) -> Value:
@@ -67,8 +86,10 @@ def _inv(m: Value) -> Value:
 
 
 def _size(v: Value) -> Value:
+    if type(v) is str:
+        return n_characters(v)
     if type(v) is not list:
-        raise TypeError("expected a list or a matrix")
+        raise TypeError(f"expected a matrix, a list or a string, got {described(v)}")
     if v and type(v[0]) is list:
         return [len(v), len(v[0])]
     return len(v)
@@ -81,13 +102,13 @@ MATHS: Builtins = {
     "atan2": _atan2,
     "ceil": _of_one(lambda f: int32(math.ceil(f))),
     "cos": _of_one(math.cos),
-    "d2r": _of_one(math.radians),
+    "d2r": _d2r,
     "floor": _of_one(lambda f: int32(math.floor(f))),
     "inv": _inv,
     "log": _log,
     "norm": _norm,
     "pow": _pow,
-    "r2d": _of_one(math.degrees),
+    "r2d": _r2d,
     "sin": _of_one(math.sin),
     "size": _size,
     "sqrt": _of_one(math.sqrt, "a number of 0 or more"),

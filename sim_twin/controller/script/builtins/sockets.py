@@ -11,7 +11,8 @@ from collections.abc import Callable, Generator
 from typing import TypeAlias, TypeVar
 
 from sim_twin.controller.script.arithmetic import int32
-from sim_twin.controller.script.builtins.arguments import flag, integer, number, text
+from sim_twin.controller.script.builtins.arguments import flag, integer, text
+from sim_twin.controller.script.builtins.arguments import number as as_number
 from sim_twin.controller.script.builtins.connection import Connection
 from sim_twin.controller.script.builtins.waiting import slices_in
 from sim_twin.controller.script.code import Builtins
@@ -29,7 +30,7 @@ _Waiting: TypeAlias = Generator[Wait, None, T]
 _FIRST = "socket_0"
 _OPEN_TIMEOUT_S = 2.0
 _N_NUMBERS_MAX = 30  # in one read
-_N_TEXT_MAX = 1023  # bytes of a string without an ending
+_N_TEXT_MAX = 1023  # bytes of a string; a robot counts its end in
 _PARENTHESES = re.compile(rb"\([^()]*\)")
 _WHOLE = re.compile(r"-?[0-9]{1,10}")
 
@@ -94,11 +95,11 @@ class Sockets:
         connection = self._connections.get(text(socket_name))
         return connection is not None and connection.send(message)
 
-    def _send_string(self, str_: Value, socket_name: Value = _FIRST) -> Value:
-        return self._send(_bytes_of(str_), socket_name)
+    def _send_string(self, str: Value, socket_name: Value = _FIRST) -> Value:
+        return self._send(_bytes_of(str), socket_name)
 
-    def _send_line(self, str_: Value, socket_name: Value = _FIRST) -> Value:
-        return self._send(_bytes_of(str_) + b"\n", socket_name)
+    def _send_line(self, str: Value, socket_name: Value = _FIRST) -> Value:
+        return self._send(_bytes_of(str) + b"\n", socket_name)
 
     def _send_byte(self, value: Value, socket_name: Value = _FIRST) -> Value:
         return self._send(bytes([integer(value) & 0xFF]), socket_name)
@@ -128,7 +129,7 @@ class Sockets:
         interpret_escape: Value = False,
         timeout: Value = 2,
     ) -> _Waiting[Value]:
-        begin, end = text(prefix), text(suffix)
+        begin, end = text(prefix).lstrip(" "), text(suffix).lstrip(" ")
         if flag(interpret_escape):
             begin, end = (mark.replace("\\n", "\n").replace("\\r", "\r").replace("\\t", "\t") for mark in (begin, end))
 
@@ -137,28 +138,30 @@ class Sockets:
                 return connection.take_any(_N_TEXT_MAX)
             return connection.take_between(begin.encode("latin-1"), end.encode("latin-1"))
 
-        taken = yield from self._await(socket_name, number(timeout), take)
-        return (taken or b"").decode("latin-1")
+        taken = yield from self._await(socket_name, as_number(timeout), take)
+        return (taken or b"")[:_N_TEXT_MAX].decode("latin-1")
 
     def _read_line(self, socket_name: Value = _FIRST, timeout: Value = 2) -> _Waiting[Value]:
-        line = yield from self._await(socket_name, number(timeout), lambda connection: connection.take_through(b"\n"))
+        line = yield from self._await(
+            socket_name, as_number(timeout), lambda connection: connection.take_through(b"\n")
+        )
         return (line or b"").rstrip(b"\r\n").decode("latin-1")
 
-    def _read_binary_integer(self, number_: Value, socket_name: Value = _FIRST, timeout: Value = 2) -> _Waiting[Value]:
-        n = _count(number_)
-        taken = yield from self._await(socket_name, number(timeout), lambda connection: connection.take(4 * n))
+    def _read_binary_integer(self, number: Value, socket_name: Value = _FIRST, timeout: Value = 2) -> _Waiting[Value]:
+        n = _count(number)
+        taken = yield from self._await(socket_name, as_number(timeout), lambda connection: connection.take(4 * n))
         return [0, *[-1] * n] if taken is None else [n, *struct.unpack(f">{n}i", taken)]
 
-    def _read_byte_list(self, number_: Value, socket_name: Value = _FIRST, timeout: Value = 2) -> _Waiting[Value]:
-        n = _count(number_)
-        taken = yield from self._await(socket_name, number(timeout), lambda connection: connection.take(n))
+    def _read_byte_list(self, number: Value, socket_name: Value = _FIRST, timeout: Value = 2) -> _Waiting[Value]:
+        n = _count(number)
+        taken = yield from self._await(socket_name, as_number(timeout), lambda connection: connection.take(n))
         return [0, *[-1] * n] if taken is None else [n, *taken]
 
-    def _read_ascii_float(self, number_: Value, socket_name: Value = _FIRST, timeout: Value = 2) -> _Waiting[Value]:
+    def _read_ascii_float(self, number: Value, socket_name: Value = _FIRST, timeout: Value = 2) -> _Waiting[Value]:
         """Read "(1.5, 2, 3)"; the count in front says how many of the numbers came."""
-        n = _count(number_)
+        n = _count(number)
         taken = yield from self._await(
-            socket_name, number(timeout), lambda connection: connection.take_match(_PARENTHESES)
+            socket_name, as_number(timeout), lambda connection: connection.take_match(_PARENTHESES)
         )
         found = _floats((taken or b"()")[1:-1].decode("latin-1"))[:n]
         return [len(found), *found, *[math.nan] * (n - len(found))]

@@ -8,7 +8,7 @@ import msgspec
 
 from sim_twin.controller.script.builtins.arguments import flag, number
 from sim_twin.controller.script.code import Builtins
-from sim_twin.controller.script.values import Value, text_of
+from sim_twin.controller.script.values import Value, shown, text_of
 
 __all__ = ["Messages", "Popup", "message_builtins", "slices_in", "time_builtins"]
 
@@ -66,7 +66,7 @@ def message_builtins(messages: Messages) -> Builtins:
     """Return textmsg and popup for a host that shows messages."""
 
     def textmsg(s1: Value, s2: Value = "") -> Value:
-        messages.log(text_of(s1) + text_of(s2))
+        messages.log(shown(text_of(s1) + text_of(s2)))
 
     def popup(
         s: Value, title: Value = "Popup", warning: Value = False, error: Value = False, blocking: Value = False
@@ -74,8 +74,8 @@ def message_builtins(messages: Messages) -> Builtins:
         is_blocking = flag(blocking)
         messages.show(
             Popup(
-                text=text_of(s),
-                title=text_of(title),
+                text=shown(text_of(s)),
+                title=shown(text_of(title)),
                 is_warning=flag(warning),
                 is_error=flag(error),
                 is_blocking=is_blocking,

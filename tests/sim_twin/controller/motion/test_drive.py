@@ -143,19 +143,38 @@ def test_freedrive_holds_the_axes_that_are_not_free():
     assert np.abs(way[:2]).max() < 0.2 * way[2]
 
 
-def test_a_wrong_payload_biases_the_force():
+def test_what_hangs_untold_biases_the_force_until_a_payload_is_told_or_the_force_zeroed():
     drive = make_drive()
     tool = drive.world.arm.tool
     idle(drive, 5)
     assert drive.measured.wrench == pytest.approx(np.zeros(6), abs=1e-9)
-    drive.set_payload(tool.mass_kg + 1.0, tool.com_m)
+    drive.hang(1.0)
     idle(drive, 5)
-    assert drive.measured.wrench[2] == pytest.approx(9.81)
+    assert drive.measured.wrench[2] == pytest.approx(-9.81)
     drive.zero_force()
     idle(drive, 5)
     assert drive.measured.wrench == pytest.approx(np.zeros(6), abs=1e-2)
+    drive.hang(2.0)
+    idle(drive, 5)
+    assert drive.measured.wrench[2] == pytest.approx(-9.81, abs=1e-2)
+    drive.set_payload(tool.mass_kg, tool.com_m)
+    idle(drive, 1)
+    assert drive.measured.wrench == pytest.approx(np.zeros(6), abs=1e-2)
     with pytest.raises(ValueError, match="payload"):
         drive.set_payload(-1.0)
+
+
+def test_the_force_is_zeroed_once_more_at_the_end_of_a_payloads_transition():
+    drive = make_drive()
+    drive.set_payload(1.0, n_transition=10)
+    idle(drive, 5)
+    drive.hang(1.0)
+    idle(drive, 5)
+    assert np.abs(drive.measured.wrench).max() > 5.0
+    idle(drive, 1)
+    assert (drive.measured.wrench == 0.0).all()
+    idle(drive, 5)
+    assert drive.measured.wrench == pytest.approx(np.zeros(6), abs=1e-2)
 
 
 def test_joint_history_reaches_back():
@@ -165,7 +184,10 @@ def test_joint_history_reaches_back():
         drive.tick()
         seen.append(drive.measured.q_rad)
     assert (drive.joint_history(10) == seen[-11]).all()
-    assert (drive.joint_history(10_000) == seen[0]).all()
+    assert (drive.joint_history(999) == seen[0]).all()
+    for beyond in (-1, 1000):
+        with pytest.raises(ValueError, match="expected 0 to 999 time steps"):
+            drive.joint_history(beyond)
 
 
 def test_weight_shows_in_the_currents():

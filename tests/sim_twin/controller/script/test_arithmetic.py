@@ -150,12 +150,14 @@ def test_values_print_as_on_a_robot(value, text):
     assert text_of(value) == text
 
 
-@pytest.mark.parametrize(("value", "holds"), [(True, True), (False, False), (0, False), (2, True), (0.0, False)])
-def test_conditions_are_bools_and_numbers(value, holds):
+@pytest.mark.parametrize(
+    ("value", "holds"), [(True, True), (False, False), (0, False), (2, True), (0.0, False), ("a", True), ("", False)]
+)
+def test_conditions_are_bools_numbers_and_strings(value, holds):
     assert truth(value) is holds
 
 
-@pytest.mark.parametrize("value", ["a", [], P, None])
+@pytest.mark.parametrize("value", [["a"], [], P, None])
 def test_other_conditions_are_refused(value):
     with pytest.raises(ScriptRuntimeError, match="expected True or False"):
         truth(value)

@@ -14,7 +14,7 @@ from tests.support.scripts import ScriptRun, error_of, program
         ("x = 5\nx[0] = 1", "expected a list or a pose before [ ], got the integer 5"),
         ("x = True + 1", "the bool True + the integer 1 is not defined"),
         ("x = 1 / 0", "division by zero"),
-        ('if "yes":\n note(1)\n end', "expected True or False, got the string 'yes'"),
+        ('if ["yes"]:\n note(1)\n end', "expected True or False, got the list [yes]"),
         ("while [1]:\n sync()\n end", "expected True or False, got the list [1]"),
         ("x = p[1, 2, 3, 4, 5, True]", "expected numbers in p[ ], got the bool True"),
         ("x = struct(a=1)\ny = x.b", "no member 'b', it has a"),
