@@ -62,11 +62,12 @@ class BusAccount:
     def station(
         self, station: Station, *, purpose: Purpose | None = None, measure: Callable[[], ArmState] | None = None
     ) -> RecordedStation:
-        """Return a station of which is told."""
+        """Return a station of which is told; what its arm measures and is sent, a recorder hears on the bus itself."""
+        del measure
         is_own = purpose in (None, Purpose.LEARN)
         told = RecordedStation(
             station, self.recorder, purpose=purpose or Purpose.LEARN, now_ns=self._now_ns,
-            heard=self.heard if is_own else None, measure=measure,
+            heard=self.heard if is_own else None,
         )  # fmt: skip
         self._station = self._station or told
         return told
