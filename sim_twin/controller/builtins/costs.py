@@ -56,10 +56,8 @@ COSTS: dict[str, int] = {
     "speedl": 900,
     "stopj": 200,
     "stopl": 500,
-    "str_cat": 40,
     "textmsg": 400,
     "to_num": 30,
-    "to_str": 120,
     "tool_contact": 150,
     "wrench_trans": 60,
 }

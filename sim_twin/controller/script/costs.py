@@ -4,7 +4,7 @@ A slice's budget is a bound on time without a clock. It holds as far as nothing 
 of an expression one step, what goes through lists and strings by their length, a builtin what it was measured to take.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import msgspec
 
@@ -39,6 +39,8 @@ _PLACE = 6  # where a part of a variable is assigned
 NUMBERS = frozenset({bool, int, float})
 _WRITTEN, _MIXED = 3, 6  # a number as text, in a list of numbers and in any other
 _POSE = 16
+_LONG, _DIGITS = 1e15, 160  # from where a float with six decimals is long, and how long it takes to write
+_N_WRITTEN = 400  # numbers of a list of which any can be that long: more have no place in to_str
 WRITING = frozenset({"popup", "socket_send_line", "socket_send_string", "str_cat", "textmsg", "to_str"})
 """Functions that write their arguments out, whatever those are."""
 
@@ -84,13 +86,21 @@ def length_cost(value: Value) -> int:
 
 def text_cost(value: Value) -> int:
     """Return what it costs to write a value out, beside going through it; a number among other things takes longer."""
+    if type(value) is float:
+        return _digit_cost((value,))
     if type(value) is list:
         others = [part for part in value if type(part) not in NUMBERS]
-        written = (_MIXED if others else _WRITTEN) * len(value)
+        written = (_MIXED if others else _WRITTEN) * len(value) + _digit_cost(value[:_N_WRITTEN])
         return written + sum(_PART + text_cost(part) for part in others)
     if type(value) is ScriptStruct:
         return sum(_MIXED + _PART + text_cost(part) for part in value.members.values())
-    return _POSE if isinstance(value, Pose) else 0
+    return _POSE + _digit_cost(value) if isinstance(value, Pose) else 0
+
+
+def _digit_cost(values: Sequence[Value]) -> int:
+    """Return what the long numbers among some cost; three make a string as long as it may be."""
+    n_long = sum(type(value) is float and not -_LONG < value < _LONG for value in values)
+    return _DIGITS * min(n_long, 3)
 
 
 def _n_nodes(node: object) -> int:

@@ -96,6 +96,8 @@ LONG = (
     "textmsg(numbers)",
     "textmsg(mixed)",
     "popup(numbers)",
+    "x = to_str([1.2345e300, 1.2345e300, 1.2345e300])",
+    "x = str_cat(frame, pose)",
 )
 
 

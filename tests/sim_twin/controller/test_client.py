@@ -168,12 +168,15 @@ def test_getters_agree_with_one_another(station):
     assert control.setTcp(tool)
 
 
-def test_the_payload_is_told_and_biases_the_force(station):
+def test_a_payload_that_is_told_zeroes_the_force_of_what_hangs_untold(station):
     control, receive = station.control, station.receive
     assert control.zeroFtSensor()
+    station.process.fault("payload", kg=1.0)
+    assert until(lambda: receive.getActualTCPForce()[2] == pytest.approx(-9.81, abs=0.2))
     assert control.setPayload(1.925, [0, 0, 0.05])
     assert until(lambda: receive.getPayload() == pytest.approx(1.925))
-    assert until(lambda: receive.getActualTCPForce()[2] == pytest.approx(9.81, abs=0.2))
+    assert until(lambda: receive.getActualTCPForce()[2] == pytest.approx(0.0, abs=0.2))
+    station.process.fault("payload")
     assert control.setTargetPayload(0.925, [0, 0, 0.058], [1e-3, 1e-3, 1e-3, 0, 0, 0])
     assert until(lambda: receive.getPayloadInertia()[0] == pytest.approx(1e-3))
 
