@@ -120,11 +120,16 @@ def test_what_was_recorded_over_the_bus_is_replayed_to_the_same_learner(endpoint
         bus_percepts = sum(1 for _ in session.raw(["bus/percept"]))
     # A busy machine is late, and a topic of which the newest counts may leave some out; what is learnt from may not.
     wrong = [f for f in checked.findings if f.severity == "error" and f.kind != "gap"]
-    assert [f for f in wrong if f.kind != "lost messages" or f.topic not in ("arm/state", "verdict", "health")] == []
+    assert [
+        f
+        for f in wrong
+        if f.kind != "lost messages"
+        or f.topic not in ("arm/state", "command/requested", "command/sent", "verdict", "health")
+    ] == []
     assert n[PERCEPT.name] == replayed.n_steps + 2
     assert bus_percepts >= replayed.n_steps
-    assert n[REQUESTED.name] >= n[SENT.name] > replayed.n_steps
-    assert n[VERDICT.name] >= n[SENT.name]
+    # Of these the newest counts, and a busy machine may leave some out.
+    assert min(n[REQUESTED.name], n[SENT.name], n[VERDICT.name]) > replayed.n_steps
 
 
 @pytest.mark.slow
