@@ -23,7 +23,7 @@ from robot.safety import TooManyLatchesError
 from sim_twin.operator import SimulatedOperator
 
 LATCHES_ANEW = pytest.mark.slow_on_a_wire("another word of the same gate, and each takes two seconds to arm again")
-EPISODES = pytest.mark.slow_on_a_wire("the epoch after a latch, and the plant's own resets, say the same of a wire")
+EPISODES = pytest.mark.slow_on_a_wire("episodes take their time on a wire, and the plant's own resets say much of it")
 ONE_OF_MANY = pytest.mark.slow_on_a_wire("shaped by the same motion, whatever the plant")
 COUNTS = pytest.mark.slow_on_a_wire("the station counts, whatever its plant, and each latch takes two seconds")
 
@@ -260,6 +260,7 @@ def test_an_epoch_depends_on_nothing_before_its_reset(world, two):
     assert is_same(world, episode(straight, seed=3, epoch=2, n=world.n_steps), first)
 
 
+@EPISODES
 def test_an_epoch_after_a_latch_is_the_epoch_that_would_have_been(world, two):
     station, operator = two[0]
     expected = episode(station, seed=3, epoch=2, n=world.n_steps)
@@ -351,6 +352,7 @@ def test_a_latch_is_not_cleared_by_a_reset_but_by_an_operator_after_the_plants(s
     assert not station.step(go()).is_void
 
 
+@LATCHES_ANEW
 def test_after_a_latch_motion_starts_from_rest_at_the_measured_joints(engaged):
     station, arm, operator = engaged
     for _ in range(6):
