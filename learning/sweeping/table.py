@@ -33,20 +33,21 @@ class Pace:
         folder = self._runner.folder
         return sum(min(self.n_epochs, epochs_done(cell, folder)) for cell in self._runner.cells)
 
-    def left_s(self, seconds: float) -> float | None:
-        """Return how long is left after so many seconds of this session; None while nothing is known."""
-        n_new = self.n_done - self._n_first
-        return seconds * (self.n_all - self.n_done) / n_new if n_new > 0 else None
+    def left_s(self, seconds: float, n_done: int) -> float | None:
+        """Return how long is left after so many seconds of this session and epochs; None while nothing is known."""
+        n_new = n_done - self._n_first
+        return seconds * (self.n_all - n_done) / n_new if n_new > 0 else None
 
 
 def sweep_table(runner: SweepRunner, pace: Pace, *, seconds: float) -> Table:
     """Return one row a cell under way, and how all of them stand."""
-    left_s = pace.left_s(seconds)
+    n_done = pace.n_done  # every cell's table is looked at for it
+    left_s = pace.left_s(seconds, n_done)
     left = "" if left_s is None else f", about {left_s / MINUTE_S:.0f} min left"
     table = Table("cell", "epoch", "")
     table.title = (
         f"{runner.sweep.name}: {runner.n_finished} of {len(runner.cells)} cells, "
-        f"{100 * pace.n_done / pace.n_all:.0f} %{left}"
+        f"{100 * n_done / pace.n_all:.0f} %{left}"
     )
     for name, cell in runner.running.items():
         at = epochs_done(cell, runner.folder)

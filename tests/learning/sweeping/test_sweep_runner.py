@@ -9,6 +9,7 @@ from learning.sweeping.cells import cells_of, epochs_done, is_finished, words_of
 from learning.sweeping.executor import End
 from learning.sweeping.manifest import take_folder
 from learning.sweeping.runner import SweepRunner
+from learning.sweeping.table import Pace, sweep_table
 
 SWEEP = Sweep(name="small", presets=("default", "paper"), seeds=(3, 4), epochs=40, tries=2)
 
@@ -171,3 +172,19 @@ def test_a_wrong_sweep_is_told_by_place(tmp_path, text, expected):
 def test_files_that_a_sweep_names_are_paths_from_where_it_lies(tmp_path):
     (tmp_path / "sweep.yaml").write_text("name: a\nseeds: [1]\npresets: [default, mine.yaml]\n")
     assert load_sweep(tmp_path / "sweep.yaml").presets == ("default", str(tmp_path / "mine.yaml"))
+
+
+def test_a_person_is_told_how_far_all_cells_are_and_how_long_the_rest_takes(tmp_path):
+    runner, _, _ = runner_of(tmp_path, np.random.default_rng(1), dies=0.0)
+    pace = Pace(runner, n_epochs=40)
+    assert pace.left_s(60.0, 0) is None
+    runner.look()
+    runner.look()
+    n_done = pace.n_done
+    assert 0 < n_done < pace.n_all == 160
+    assert pace.left_s(60.0, n_done) == pytest.approx(60.0 * (160 - n_done) / n_done)
+    table = sweep_table(runner, pace, seconds=60.0)
+    assert table.title == (
+        f"small: 0 of 4 cells, {100 * n_done / 160:.0f} %, about {(160 - n_done) / n_done:.0f} min left"
+    )
+    assert table.row_count == 2
