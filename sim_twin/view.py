@@ -134,9 +134,11 @@ def _show_on_page(world: Any, pipe: Connection, numbers: Sequence[float]) -> Non
     with launch_web.launch(config, plugins=[app.App()]) as handle:
         handle.set_model(world.model, data=world.data)
         for _ in range(round(START_S / FRAME_S)):
-            if bound:
+            if bound and _is_answered(bound[0].getsockname()):
                 break
             sleep(FRAME_S)
+        else:
+            return  # a process that ends without a word is told of as such
         pipe.send(f"http://{LOOPBACK}:{bound[0].getsockname()[1]}/")
         while handle.is_running() and not _is_over(pipe):
             if _pose(world, numbers):
@@ -161,6 +163,17 @@ def _bind(port: int) -> Any:  # noqa: ANN401
         else:
             return bound
     raise RuntimeError(f"expected a free port from {PORT} on, {error}")
+
+
+def _is_answered(address: tuple[str, int]) -> bool:
+    """Return whether somebody listens there: a page is bound to its port some time before it is served."""
+    import socket
+
+    try:
+        socket.create_connection(address, timeout=FRAME_S).close()
+    except OSError:
+        return False
+    return True
 
 
 def _pose(world: Any, numbers: Sequence[float]) -> bool:  # noqa: ANN401
