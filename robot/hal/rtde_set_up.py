@@ -138,11 +138,15 @@ def _await_end(receive: RTDEReceiveInterface, clock: Clock, *, may_be_paused: bo
 def set_tool(control: RTDEControlInterface, receive: RTDEReceiveInterface, clock: Clock, tool: Tool) -> None:
     """Set payload, its mass and centre, and tool centre point, and read them back.
 
+    A payload that the controller reckons with already is not told again, for to be told one zeroes the force sensor:
+    the weight of something else on the flange, for which the first motion waits, would be gone from what it reads.
+
     Raises:
         ArmRefusedError: the controller has others.
     """
     tcp = [*tool.tcp_m, 0.0, 0.0, 0.0]
-    require(control.setPayload(tool.mass_kg, list(tool.com_m)), "setPayload", receive=receive, clock=clock)
+    if not _carries(receive, tool):
+        require(control.setPayload(tool.mass_kg, list(tool.com_m)), "setPayload", receive=receive, clock=clock)
     require(control.setTcp(tcp), "setTcp", receive=receive, clock=clock)
     if any(abs(a - b) > TCP_TOLERANCE for a, b in zip(control.getTCPOffset(), tcp, strict=True)):
         raise ArmRefusedError(f"expected tool centre point {tcp}, the controller says {control.getTCPOffset()}")

@@ -8,6 +8,7 @@ import pytest
 from config.loader import load_arm
 from robot.errors import ArmRefusedError
 from robot.hal.rtde_set_up import prove_watchdog, set_tool
+from tests.support.genuine_client import until
 from tests.support.loopback import own_address
 
 pytestmark = pytest.mark.realtime
@@ -44,13 +45,37 @@ class Ticks:
 @pytest.mark.parametrize("off_m", [0.0, 9e-5, -9e-5])
 def test_a_tool_whose_centre_is_read_back_is_set(station, off_m):
     tool = msgspec.structs.replace(load_arm("ur5e").tool, com_m=(0.001, -0.002, 0.07))
+    tell(station, tool.mass_kg + 0.5, tool.com_m)
     set_tool(OffCentre(station.control, off_m), station.receive, Ticks(), tool)
     assert station.receive.getPayloadCog() == pytest.approx([0.001 + off_m, -0.002, 0.07], abs=1e-9)
 
 
 def test_another_centre_of_mass_than_asked_is_refused(station):
+    tool = msgspec.structs.replace(load_arm("ur5e").tool, com_m=(0.002, 0.0, 0.07))
     with pytest.raises(ArmRefusedError, match="m of the flange, the controller says"):
-        set_tool(OffCentre(station.control, 2e-4), station.receive, Ticks(), load_arm("ur5e").tool)
+        set_tool(OffCentre(station.control, 2e-4), station.receive, Ticks(), tool)
+
+
+@pytest.mark.parametrize(("told_kg", "left_n"), [(0.0, 29.4), (0.5, 0.0)])
+def test_what_hangs_beside_a_payload_that_is_told_already_stays_in_the_force(station, told_kg, left_n):
+    tool = load_arm("ur5e").tool
+    tell(station, tool.mass_kg + told_kg, tool.com_m)
+    try:
+        station.process.fault("payload", kg=3.0)
+        assert until(lambda: pulled_n(station) > 25.0)
+        set_tool(station.control, station.receive, Ticks(), tool)
+        assert until(lambda: abs(pulled_n(station) - left_n) < 3.0)
+    finally:
+        station.process.fault("payload")
+
+
+def tell(station, mass_kg, com_m):
+    assert station.control.setPayload(mass_kg, list(com_m))
+    assert until(lambda: abs(station.receive.getPayload() - mass_kg) < 1e-6)
+
+
+def pulled_n(station):
+    return math.hypot(*station.receive.getActualTCPForce()[:3])
 
 
 class Told:
