@@ -11,6 +11,7 @@ import os
 import socket
 import struct
 from collections.abc import Callable
+from math import inf
 from select import POLLIN, poll
 from threading import Event, Thread
 from types import TracebackType
@@ -30,6 +31,7 @@ GRACE_S = 0.02
 TIMEOUT_S = 2.0
 N_BYTES = 4096
 _HEADER = struct.Struct(">HB")
+_PACKAGE = struct.Struct(">Bd")
 _QUESTIONS = (("V", b"\x00\x02"), ("O", struct.pack(">d", RATE_HZ) + b"timestamp"), ("S", b""))
 
 
@@ -50,6 +52,7 @@ class TakingWatch:
         self._at, self._when_lost = (address, port), when_lost
         self._is_over = Event()
         self._thread = Thread(target=self._run, name="taking watch", daemon=True)
+        self._unread, self._time_s = b"", -inf
         self.why: str | None = None
 
     def __enter__(self) -> Self:
@@ -91,22 +94,36 @@ class TakingWatch:
         looks, n_silent = poll(), 0
         looks.register(self._link, POLLIN)
         while not self._is_over.is_set():
-            if not looks.poll(1e3 * LOOK_S):
-                n_silent += 1
-                if n_silent >= N_SILENT:
-                    self._tell(f"it has said nothing for {1e3 * LOOK_S * N_SILENT:.0f} ms", grace_s=0.0)
-                    return
-            elif self._is_cut():
+            is_told = bool(looks.poll(1e3 * LOOK_S))
+            if is_told and self._is_cut():
                 self._tell("it hung up", grace_s=GRACE_S)
                 return
-            else:
-                n_silent = 0
+            n_silent = 0 if is_told and self._goes_on() else n_silent + 1
+            if n_silent >= N_SILENT:
+                what = "its time has stood still" if is_told else "it has said nothing"
+                self._tell(f"{what} for {1e3 * LOOK_S * N_SILENT:.0f} ms", grace_s=0.0)
+                return
 
     def _is_cut(self) -> bool:
+        """Take what came. Returns whether that is the end of it."""
         try:
-            return not self._link.recv(N_BYTES)
+            came = self._link.recv(N_BYTES)
         except OSError:
             return True
+        self._unread += came
+        return not came
+
+    def _goes_on(self) -> bool:
+        """Read the whole packages that came. Returns whether one of them tells a later time than any before."""
+        before_s = self._time_s
+        while len(self._unread) >= _HEADER.size:
+            size, kind = _HEADER.unpack_from(self._unread)
+            if len(self._unread) < max(size, _HEADER.size):
+                break
+            if kind == ord("U") and size == _HEADER.size + _PACKAGE.size:
+                _, self._time_s = _PACKAGE.unpack_from(self._unread, _HEADER.size)
+            self._unread = self._unread[max(size, _HEADER.size) :]
+        return self._time_s > before_s
 
     def _tell(self, what: str, *, grace_s: float) -> None:
         if not self._is_over.wait(grace_s):

@@ -15,17 +15,16 @@ from tests.support.loopback import own_address
 pytestmark = pytest.mark.realtime
 
 ANSWERS = {"V": b"\x01", "O": b"\x01DOUBLE", "S": b"\x01"}
-PACKAGE = struct.pack(">HBBd", 12, ord("U"), 1, 0.5)
 LATE_S = 0.2
 """More than it may take here, on a machine with other things to do."""
 
 
 class Controller:
-    """Answers like an RTDE port, and tells its time until told to be silent or to hang up."""
+    """Answers like an RTDE port, and tells its time until told to be silent, to stand still or to hang up."""
 
     def __init__(self, host):
         self.heard, self._host = [], host
-        self.is_silent, self._is_over = Event(), Event()
+        self.is_silent, self.is_still, self._is_over = Event(), Event(), Event()
         self._listening = socket.create_server((host, 0))
         self.port = self._listening.getsockname()[1]
         self._thread = Thread(target=self._run)
@@ -55,9 +54,11 @@ class Controller:
                 assert chr(kind) != "O" or payload[8:] == b"timestamp"
                 answer = ANSWERS[chr(kind)]
                 link.sendall(struct.pack(">HB", 3 + len(answer), kind) + answer)
+            time_s = 0.5
             while not self._is_over.wait(0.008):
+                time_s += 0.0 if self.is_still.is_set() else 0.008
                 if not self.is_silent.is_set():
-                    link.sendall(PACKAGE)
+                    link.sendall(struct.pack(">HBBd", 12, ord("U"), 1, time_s))
 
 
 @contextmanager
@@ -91,9 +92,10 @@ def test_nothing_is_told_of_a_controller_that_goes_on_and_nothing_is_written_to_
     [
         (Controller.hang_up, "hung up", GRACE_S),
         (lambda controller: controller.is_silent.set(), "said nothing", LOOK_S * (N_SILENT - 1)),
+        (lambda controller: controller.is_still.set(), "stood still", 0.008 * (N_SILENT - 1)),
     ],
 )
-def test_one_that_hangs_up_or_falls_silent_is_told_once_within_its_time(wrong, why, earliest_s):
+def test_one_that_hangs_up_falls_silent_or_stands_still_is_told_once_within_its_time(wrong, why, earliest_s):
     with watched() as (controller, watch, told):
         begun_s = monotonic()
         wrong(controller)
