@@ -1,6 +1,8 @@
 """The controller's state without its programs: drive, modes, registers, terminals. What builtins and panels act on."""
 
 from collections import deque
+from collections.abc import Callable
+from functools import partial
 
 from sim_twin.controller.io import InputsOutputs
 from sim_twin.controller.journal import Journal
@@ -87,11 +89,17 @@ class Machine:
         core = self.drive.core
         return self.n_standing >= N_STEADY and core.force_task is None and not core.is_free
 
-    def write(self, name: str, value: Value) -> None:
-        """Take one input that a client writes; wire.InputSink."""
-        self.watchdogs.wrote(name)
-        if self.registers.write(name, value):  # pyright: ignore[reportArgumentType] -- a register's field is a number
-            return
+    def writer(self, name: str) -> Callable[[Value], None]:
+        """Return what takes one input that a client writes; wire.InputSink."""
+        wrote, store = self.watchdogs.wrote, self.registers.writer(name) or partial(self._take, name)
+
+        def write(value: Value) -> None:
+            wrote(name)
+            store(value)
+
+        return write
+
+    def _take(self, name: str, value: Value) -> None:
         if not self.io.write(name, value) and name == "external_force_torque":
             self.external_wrench = [float(v) for v in value]  # pyright: ignore[reportGeneralTypeIssues,reportArgumentType] -- six by its type
 

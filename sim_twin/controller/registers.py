@@ -2,8 +2,6 @@
 
 from collections.abc import Callable
 
-from sim_twin.controller.script import Value
-
 __all__ = ["N_BITS", "N_NUMBERS", "RegisterBank", "Registers"]
 
 N_BITS, N_NUMBERS = 128, 48
@@ -71,12 +69,9 @@ class Registers:
         self.outputs = RegisterBank()
         self._writers = _writers(self.inputs)
 
-    def write(self, name: str, value: Value) -> bool:
-        """Store what a client writes under RTDE's name, and tell whether there is such a register."""
-        writer = self._writers.get(name)
-        if writer is not None:
-            writer(value)
-        return writer is not None
+    def writer(self, name: str) -> Callable | None:
+        """Return what stores under RTDE's name; None where there is no such register."""
+        return self._writers.get(name)
 
     def getters(self) -> dict[str, Callable[[], bool | int | float]]:
         """Return what reads each register, by RTDE's names."""

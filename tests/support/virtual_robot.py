@@ -56,12 +56,12 @@ class RegisterClient:
         self.trace = []
 
     def say(self, command, doubles=(), ints=()):
-        write, first = self.robot.machine.write, self.first
+        writer, first = self.robot.machine.writer, self.first
         for i, value in enumerate(doubles):
-            write(f"input_double_register_{first + i}", float(value))
+            writer(f"input_double_register_{first + i}")(float(value))
         for i, value in enumerate(ints):
-            write(f"input_int_register_{first + 1 + i}", value)
-        write(f"input_int_register_{first}", command)
+            writer(f"input_int_register_{first + 1 + i}")(value)
+        writer(f"input_int_register_{first}")(command)
 
     def state(self):
         return self.robot.machine.registers.outputs.ints[self.first]

@@ -163,8 +163,8 @@ class Robot:
         self.now = msgspec.structs.replace(self.now, **changes)
 
     # inputs
-    def write(self, name, value):
-        self.written.append((name, value))
+    def writer(self, name):
+        return lambda value: self.written.append((name, value))
 
     # scripts and states
     def refuse_script(self, why, source):

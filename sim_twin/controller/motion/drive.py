@@ -2,6 +2,7 @@
 
 from collections import deque
 from collections.abc import Sequence
+from operator import is_
 
 import mujoco
 import numpy as np
@@ -20,9 +21,9 @@ from sim_twin.controller.motion.limits import (
     default_limits,
     is_outside,
 )
-from sim_twin.controller.motion.measured import Measured, flange_velocity
+from sim_twin.controller.motion.measured import Measured
 from sim_twin.controller.motion.motions import Motions
-from sim_twin.controller.motion.poses import Array, pose_from_matrix, vec6
+from sim_twin.controller.motion.poses import Array, vec6
 from sim_twin.controller.motion.setpoint import SLICE_S
 from sim_twin.controller.motion.stopping import stop_path
 from sim_twin.controller.motion.wrench import (
@@ -41,6 +42,8 @@ CB3 UR5's category 0 stop (see stopping.STOP_RAD_S2)."""
 HOLD_NM = np.array([150.0, 150.0, 150.0, 28.0, 28.0, 28.0])
 """Torque of brakes that hold a standing one."""
 HELD_RAD_S = 0.005
+ASKED_RAD_S, STILL_RAD_S = 1e-6, 0.01
+"""Slower than both a set-point and the joints stand."""
 BRAKE_SOLIMP = (0.9999, 0.9999)
 """A brake that hardly creeps; MuJoCo's own friction gives way in proportion to the load."""
 N_HISTORY = 1000
@@ -105,7 +108,9 @@ class TwinDrive:
         self._is_compliant = False
         self._feeling = Feeling()
         self._n_struck = 0
-        self._velocity = np.zeros(3)
+        self._moved = np.zeros((3, 6))
+        self._asked: tuple[object, ...] = (None, None, None)
+        self._asked_m = np.zeros(3)
         self.lock()
         self.measured = self._read()
 
@@ -312,7 +317,10 @@ class TwinDrive:
     @property
     def is_standing(self) -> bool:
         """Set-point and joints are at rest, whatever is read of them."""
-        return self.motions.setpoint.fastest_rad_s < 1e-6 and float(np.abs(self.world.data.qvel[:6]).max()) < 0.01
+        asked, measured = self.motions.setpoint.qd_target.tolist(), self.world.data.qvel[:6].tolist()
+        return all(-ASKED_RAD_S < v < ASKED_RAD_S for v in asked) and all(
+            -STILL_RAD_S < v < STILL_RAD_S for v in measured
+        )
 
     @property
     def is_led_by_torque(self) -> bool:
@@ -354,8 +362,11 @@ class TwinDrive:
         return breach
 
     def _asked_tool_m(self) -> Array:
-        """Where the set-point brings the tool."""
-        return self.core.tool_at(self.motions.setpoint.q_target)[:3, 3]
+        """Where the set-point brings the tool: found once for each; neither is ever written into."""
+        asked = self.motions.setpoint.q_target, self.core.T_ft, self.kinematics.rows
+        if not all(map(is_, asked, self._asked)):
+            self._asked, self._asked_m = asked, self.core.tool_at(asked[0])[:3, 3]
+        return self._asked_m
 
     def _stop_m(self, q_rad: Array, qd_rad_s: Array) -> tuple[Array, ...]:
         """Return where a stop that began now would bring the tool, half-way and at its end, where planes ask for it."""
@@ -378,20 +389,18 @@ class TwinDrive:
     def _read(self) -> Measured:
         model, data = self.world.model, self.world.data
         q, qd = data.qpos[:6].copy(), data.qvel[:6].copy()
-        T_bt, J = self.kinematics.forward_and_jacobian(q, self.core.T_ft)
-        tool_m = T_bt[:3, 3]
+        self._moved = moved = self.kinematics.tool_motion(q, qd, self.core.T_ft, self._moved)
+        tcp_pose, tcp_speed, flange = moved
         T_bf = self.kinematics.forward(q) if self._sensor.is_biased else None
-        wrench = self._sensor.read(model, data, tool_m, T_bf, self.n_slices)
-        velocity = flange_velocity(T_bt, J @ qd, self.core.T_ft)
-        acceleration, self._velocity = (velocity - self._velocity) / SLICE_S, velocity
+        wrench = self._sensor.read(model, data, tcp_pose[:3], T_bf, self.n_slices)
         # Brakes hold without power, and the twin carries the weight whatever does.
         torque = np.zeros(6) if self.is_braked else data.qfrc_actuator[:6] + data.qfrc_gravcomp[:6]
         return Measured(
             q_rad=q,
             qd_rad_s=qd,
-            tcp_pose=pose_from_matrix(T_bt),
-            tcp_speed=J @ qd,
-            acceleration=acceleration,
+            tcp_pose=tcp_pose,
+            tcp_speed=tcp_speed,
+            acceleration=flange[:3],
             wrench=wrench,
             torque_nm=torque,
             current_a=torque / NM_PER_A,

@@ -12,8 +12,10 @@ import msgspec
 import numpy as np
 
 from config.arm import ArmConfig
+from robot.compiled import Table
 from sim_twin.controller.motion.chain import chain_and_jacobian, chain_end
 from sim_twin.controller.motion.poses import Array, between, inverse, matrix_from_pose, pose_from_matrix, six, vec6
+from sim_twin.controller.motion.sensed import tool_motion
 
 __all__ = [
     "ArmKinematics",
@@ -122,6 +124,10 @@ class ArmKinematics:
     def jacobian(self, q_rad: Sequence[float] | Array, T_ft: Array | None = None) -> Array:
         """Return J with (v, w) = J qd at the tool, base axes.  (6,), (4, 4) -> (6, 6)"""
         return self.forward_and_jacobian(q_rad, T_ft)[1]
+
+    def tool_motion(self, q_rad: Array, qd_rad_s: Array, T_ft: Array, before: Table) -> Table:
+        """Return pose, twist, and the flange's acceleration and velocity: see there.  (6,), (6,), (4, 4), (3, 6)"""
+        return tool_motion(six(q_rad), six(qd_rad_s), self._table, np.ascontiguousarray(T_ft, dtype=np.float64), before)
 
     def tool_speed(self, q_rad: Array, qd_rad_s: Array, T_ft: Array | None = None) -> float:
         """Return how fast the tool moves, m/s.  (6,), (6,), (4, 4) -> ()"""

@@ -3,9 +3,8 @@
 import msgspec
 
 from sim_twin.controller.motion.poses import Array
-from sim_twin.controller.motion.wrench import cross
 
-__all__ = ["Measured", "flange_velocity"]
+__all__ = ["Measured"]
 
 
 class Measured(msgspec.Struct, frozen=True, kw_only=True):
@@ -27,9 +26,3 @@ class Measured(msgspec.Struct, frozen=True, kw_only=True):
     """Torque over a constant of each joint."""
     external_nm: Array
     """Torque on the joints from contacts."""
-
-
-def flange_velocity(T_bt: Array, twist: Array, T_ft: Array) -> Array:
-    """Return the velocity of the flange that a tool's (v, w) means, base axes.  (4, 4), (6,), (4, 4) -> (3,)"""
-    to_flange = -T_bt[:3, :3] @ (T_ft[:3, :3].T @ T_ft[:3, 3])
-    return twist[:3] + cross(twist[3:], to_flange)

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robot.messages import Vec6
+from sim_twin.controller.motion.sensed import turn_of
 
 __all__ = [
     "Array",
@@ -28,7 +29,6 @@ __all__ = [
 ]
 
 Array = NDArray[np.floating[Any]]
-TINY = 1e-12
 
 
 def vec6(values: Sequence[float] | Array, what: str = "joints") -> Array:
@@ -71,27 +71,8 @@ def rotation(vector: Sequence[float] | Array) -> Array:
 
 
 def rotation_vector(R: Array) -> Array:
-    """Return the rotation vector of R, at most half a turn long, by way of its quaternion.  (3, 3) -> (3,)"""
-    (a, b, c), (d, e, f), (g, h, i) = R.tolist()
-    # Shepperd: divide by the greatest component of the quaternion.
-    squares = (1.0 + a + e + i, 1.0 + a - e - i, 1.0 - a + e - i, 1.0 - a - e + i)
-    largest = squares.index(max(squares))
-    scale = 0.5 / math.sqrt(squares[largest])
-    if largest == 0:
-        w, v = squares[0], (h - f, c - g, d - b)
-    elif largest == 1:
-        w, v = h - f, (squares[1], d + b, c + g)
-    elif largest == 2:
-        w, v = c - g, (d + b, squares[2], h + f)
-    else:
-        w, v = d - b, (c + g, h + f, squares[3])
-    x, y, z = (scale * n for n in v)
-    sine, cosine = math.sqrt(x * x + y * y + z * z), scale * w
-    if sine < TINY:
-        return np.array([2.0 * x, 2.0 * y, 2.0 * z])
-    # A quaternion and its negative are the same turn: take the shorter way.
-    k = 2.0 * (math.atan2(sine, cosine) if cosine >= 0.0 else math.atan2(-sine, -cosine)) / sine
-    return np.array([k * x, k * y, k * z])
+    """Return the rotation vector of R, at most half a turn long.  (3, 3) -> (3,)"""
+    return np.array(turn_of(np.ascontiguousarray(R, dtype=np.float64)))
 
 
 def matrix_from_pose(pose: Sequence[float] | Array) -> Array:
@@ -104,7 +85,7 @@ def matrix_from_pose(pose: Sequence[float] | Array) -> Array:
 
 def pose_from_matrix(T: Array) -> Array:
     """Return the UR pose of T.  (4, 4) -> (6,)"""
-    return np.concatenate([T[:3, 3], rotation_vector(T[:3, :3])])
+    return np.array([T[0, 3], T[1, 3], T[2, 3], *turn_of(np.ascontiguousarray(T, dtype=np.float64))])
 
 
 def pose_trans(a: Sequence[float] | Array, b: Sequence[float] | Array) -> Array:

@@ -85,19 +85,19 @@ class Recipe:
         self._body = struct.Struct(">" + body)
         self._frame = struct.Struct(">HB" + "B" * len(self._head) + body)
         self.n_bytes = self._frame.size
-        self._parts: list[tuple[str, int, int]] = []
-        """Name, first number and how many, of each field."""
+        self._parts: list[tuple[int, int]] = []
+        """First number and how many, of each field."""
         at = 0
-        for name, kind in zip(self.names, self.kinds, strict=True):
-            self._parts.append((name, at, kind.n_items))
+        for kind in self.kinds:
+            self._parts.append((at, kind.n_items))
             at += kind.n_items
 
     def pack(self, numbers: Sequence[float]) -> bytes:
         """Return the frame of a data package; vectors come flattened, in the recipe's order."""
         return self._frame.pack(self.n_bytes, Kind.DATA, *self._head, *numbers)
 
-    def unpack(self, body: bytes) -> list[tuple[str, Value]]:
-        """Return names and values of a data package without its recipe id; vectors are tuples.
+    def unpack(self, body: bytes) -> Sequence[Value]:
+        """Return a data package's values without its recipe id, in the recipe's order; vectors are tuples.
 
         Raises:
             MalformedError: The size does not fit the recipe.
@@ -108,7 +108,9 @@ class Recipe:
                 "check the recipe id and the order of the fields"
             )
         numbers = self._body.unpack(body)
-        return [(name, numbers[at] if n == 1 else numbers[at : at + n]) for name, at, n in self._parts]
+        if len(numbers) == len(self._parts):
+            return numbers
+        return [numbers[at] if n == 1 else numbers[at : at + n] for at, n in self._parts]
 
 
 def frame(kind: Kind, payload: bytes) -> bytes:

@@ -43,8 +43,8 @@ _ACCEPTED, _REFUSED = b"\x01", b"\x00"
 class InputSink(Protocol):
     """Takes what clients write; a value stays until it is written again, whoever leaves."""
 
-    def write(self, name: str, value: Value) -> None:
-        """Set one input; the name and the type are those of `input_fields`."""
+    def writer(self, name: str) -> Callable[[Value], None]:
+        """Return what sets one input; the name and the type of what it takes are those of `input_fields`."""
         ...
 
 
@@ -57,7 +57,7 @@ class _Client:
         self.protocol = 1
         self.output: Recipe | None = None
         self.getters: list[tuple[Callable[[], Value], bool]] = []
-        self.inputs: dict[int, Recipe] = {}
+        self.inputs: dict[int, tuple[Recipe, list[Callable[[Value], None]]]] = {}
         self.rate_hz = 0.0
         self.is_started = False
         self.n_heard = 0
@@ -215,7 +215,8 @@ class RtdeServer:
         if not names or len(found) < len(kinds) or taken or recipe_id > _N_RECIPES:
             recipe_id = 0
         else:
-            client.inputs[recipe_id] = Recipe(names, found, recipe_id=recipe_id if client.protocol > 1 else None)
+            recipe = Recipe(names, found, recipe_id=recipe_id if client.protocol > 1 else None)
+            client.inputs[recipe_id] = recipe, [self._sink.writer(name) for name in names]
             self._owner_by_input |= dict.fromkeys(names, client.peer)
         words = ["IN_USE" if n in taken else (k or "NOT_FOUND") for n, k in zip(names, kinds, strict=True)]
         self._confirm(client, Kind.INPUTS, recipe_id, words)
@@ -248,17 +249,17 @@ class RtdeServer:
 
     def _write(self, client: _Client, payload: bytes) -> None:
         recipe_id, body = (payload[0] if payload else 0, payload[1:]) if client.protocol > 1 else (1, payload)
-        recipe = client.inputs.get(recipe_id)
-        if recipe is None:
+        if recipe_id not in client.inputs:
             self._say_to(client, f"expected an input recipe that was set up, came id {recipe_id}", Level.ERROR)
             return
+        recipe, writers = client.inputs[recipe_id]
         try:
             values = recipe.unpack(body)
         except MalformedError as problem:
             self._say_to(client, str(problem), Level.ERROR)
             return
-        for name, value in values:
-            self._sink.write(name, value)
+        for write, value in zip(writers, values, strict=True):
+            write(value)
 
 
 def _names(payload: bytes) -> list[str]:

@@ -87,7 +87,7 @@ def test_a_watchdog_stops_and_a_write_keeps_it_quiet():
     )
     for k in range(100):
         if k % 10 == 0:
-            robot.machine.write("input_int_register_3", k)
+            robot.machine.writer("input_int_register_3")(k)
         robot.step()
     assert state_of(robot) is PLAYING
     run(robot, 12)
@@ -368,7 +368,7 @@ def test_a_paused_program_does_not_starve_its_watchdog():
 
 def test_a_target_that_is_no_number_moves_nothing():
     robot = make_robot()
-    robot.machine.write("input_double_register_0", math.nan)
+    robot.machine.writer("input_double_register_0")(math.nan)
     robot.submit_script(
         "def f():\n q = get_actual_joint_positions()\n q[0] = read_input_float_register(0)\n servoj(q)\nend\n"
     )

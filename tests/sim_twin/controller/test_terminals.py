@@ -12,9 +12,9 @@ from tests.support.virtual_robot import make_robot, run
 
 def test_registers_keep_what_fits_and_refuse_the_rest():
     registers = Registers()
-    assert registers.write("input_int_register_47", -5)
-    assert registers.write("input_bit_registers32_to_63", 0b101)
-    assert not registers.write("speed_slider_mask", 1)
+    registers.writer("input_int_register_47")(-5)
+    registers.writer("input_bit_registers32_to_63")(0b101)
+    assert registers.writer("speed_slider_mask") is None
     assert registers.inputs.int_at(47) == -5
     assert [registers.inputs.bit_at(i) for i in (32, 33, 34)] == [True, False, True]
     assert registers.getters()["input_bit_registers32_to_63"]() == 0b101

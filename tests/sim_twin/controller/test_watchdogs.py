@@ -60,7 +60,7 @@ def test_every_input_feeds_its_watchdog(machine, name):
     machine.watchdogs.set(name, 50, STOP)
     n_items = input_fields(VERSION)[name].n_items
     for _ in range(30):
-        machine.write(name, 0 if n_items == 1 else (0,) * n_items)
+        machine.writer(name)(0 if n_items == 1 else (0,) * n_items)
         assert machine.watchdogs.tick() is None
     assert [machine.watchdogs.tick() for _ in range(10)][-1] == (name, STOP)
 
@@ -110,7 +110,7 @@ def test_a_program_that_was_resumed_without_a_write_is_paused_again():
         assert state_of(robot) is RuntimeState.PLAYING
     for _ in range(10):
         run(robot, 20)
-        robot.machine.write("input_int_register_0", 1)
+        robot.machine.writer("input_int_register_0")(1)
     assert state_of(robot) is RuntimeState.PLAYING
 
 
@@ -121,6 +121,6 @@ def test_a_slower_watchdog_outlives_the_pause_of_a_faster_one():
     robot.panel.play()
     for _ in range(4):
         run(robot, 10)
-        robot.machine.write("input_int_register_0", 1)
+        robot.machine.writer("input_int_register_0")(1)
     assert robot.programs.main is None
     assert any("input_int_register_1" in line and "stop" in line for line in lines(robot))
