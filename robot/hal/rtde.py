@@ -45,7 +45,7 @@ FIELDS = (
     "timestamp", "actual_q", "actual_qd", "actual_TCP_pose", "actual_TCP_speed",
     "actual_TCP_force", "actual_digital_input_bits",
     "actual_digital_output_bits", "robot_mode", "runtime_state", "safety_status_bits", "target_speed_fraction",
-    "payload", "payload_cog",
+    "payload", "payload_cog", "target_q",
 )  # fmt: skip
 """All that is read here. Left to itself the client asks for 58 and more, which the controller would pack, and a thread
 beside the servo loop unpack, 500 times a second."""
@@ -198,8 +198,9 @@ class RtdeArm:
 
         Raises:
             NotEngagedError: nobody took command, or the arm was stopped since.
-            ArmRefusedError: the program that obeys has ended, the controller did not take it, somebody has slowed the
-                arm down meanwhile, or an output does not follow.
+            ArmRefusedError: the program that obeys has ended or was replaced, the controller did not take it or steers
+                for something else, somebody has slowed the arm down meanwhile or changed its tool or payload, or an
+                output does not follow.
             StaleStateError: the link was cut, the client threw, or it took so long that it may have reconnected.
             WireError: the hand does not answer.
         """
@@ -211,6 +212,7 @@ class RtdeArm:
         slowed = why_slowed(self._modes[1], self._speed_fraction)
         if slowed is not None:
             raise ArmRefusedError(f"servoJ: {slowed}")
+        self._command.require_ours(command.q_rad)
         if not self._command.servo(command.q_rad, self._arm.servo):
             self._refuse("servoJ")
         self._gripper.command(command.grip)

@@ -15,12 +15,14 @@ from rtde_control import RTDEControlInterface
 from rtde_receive import RTDEReceiveInterface
 
 from config.arm import Servo, Tool
-from robot.errors import StaleStateError
+from robot.errors import ArmRefusedError, StaleStateError
+from robot.hal.obedience import LOOK_TICKS, Obedience
 from robot.hal.pins import Pins
+from robot.hal.primary_watch import PrimaryWatch
 from robot.hal.protocols import Clock
 from robot.hal.rtde_links import RtdeLinks
 from robot.hal.rtde_outputs import N_OUTPUTS, DigitalOutputs
-from robot.hal.rtde_set_up import arm_watchdog, end_program, prove_watchdog, set_tool
+from robot.hal.rtde_set_up import arm_watchdog, carries, end_program, prove_watchdog, set_tool
 from robot.hal.ur_calls import bounded
 from robot.messages import Vec6
 
@@ -32,6 +34,9 @@ TAKE_S = 8.0
 WRITE_NS = 35_000_000
 """A command that took longer was no mere sending: the client may have reconnected in it, which takes 40 ms at least."""
 ALL_BITS = (1 << N_OUTPUTS) - 1
+
+PRIMARY_TICKS = 5
+"""Of 2 ms, between two looks at who has started something on the controller."""
 
 Readers: TypeAlias = tuple[RTDEReceiveInterface, DashboardClient]
 
@@ -58,6 +63,8 @@ class RtdeCommand:
         self._links, self._pins, self._readers = links, pins, readers
         self.control: RTDEControlInterface | None = None
         self.outputs: DigitalOutputs | None = None
+        self._primary = PrimaryWatch(address, tool=(*tool.tcp_m, 0.0, 0.0, 0.0))
+        self._obedience, self._n_looks = Obedience(), 0
 
     def take(self, clock: Clock) -> None:
         """Upload the program, have its watchdog proven, upload it anew, set payload and tool, arm the watchdog last.
@@ -83,6 +90,34 @@ class RtdeCommand:
         self.control = self._connected()
         self._set_up(self.control, receive, clock)
         self._links.require()
+
+    def require_ours(self, sent_rad: Vec6) -> None:
+        """Look at one part of what may change on a controller while our program seems to run; called every tick.
+
+        Args:
+            sent_rad: where the controller was asked to bring the joints last.
+
+        Raises:
+            ArmRefusedError: somebody's program has replaced ours, tool or payload is another, or nobody obeys.
+        """
+        self._n_looks += 1
+        if self._n_looks % PRIMARY_TICKS == 0:
+            changed = self._primary.look()
+            if changed is not None:
+                is_foreign, what = changed
+                self._links.is_lost |= is_foreign  # what runs there now is not ours to end
+                raise ArmRefusedError(f"arm: {what}")
+        elif self._n_looks % LOOK_TICKS == 1:
+            receive, _ = self._readers()
+            astray = self._obedience.check(sent_rad, receive.getTargetQ())
+            if astray is not None:
+                raise ArmRefusedError(f"servoJ: {astray}")
+            if not carries(receive, self._tool):
+                raise ArmRefusedError(
+                    f"arm: somebody set another payload on its controller: {receive.getPayload()} kg at "
+                    f"{receive.getPayloadCog()} m of the flange, expected {self._tool.mass_kg} kg at "
+                    f"{[*self._tool.com_m]} m"
+                )
 
     def servo(self, q_rad: Vec6, servo: Servo) -> bool:
         """Send joints to servo to. Returns whether the client says that it did.
@@ -132,6 +167,11 @@ class RtdeCommand:
             Whether the program has ended, and no coil of a drive is left with current.
         """
         is_ended = True
+        changed = self._primary.look() if self.control is not None else None
+        self._primary.close()
+        if changed is not None and changed[0]:
+            self._links.is_lost = True  # what runs there now is not ours to end
+            return False
         if self.control is not None:
             receive, dashboard = self._readers()
             is_ended = end_program(self.control, receive, dashboard, clock)
@@ -154,6 +194,7 @@ class RtdeCommand:
 
     def end(self) -> None:
         """End the clients that a lost link has left, where this process goes on: they would go on by themselves."""
+        self._primary.close()
         control, self.control = self.control, None
         outputs, self.outputs = self.outputs, None
         if outputs is not None:
@@ -179,10 +220,12 @@ class RtdeCommand:
         return bounded(TAKE_S if self._links.when_lost is not None else None)
 
     def _set_up(self, control: RTDEControlInterface, receive: RTDEReceiveInterface, clock: Clock) -> None:
-        """Set payload and tool centre point, open the outputs, arm the watchdog last."""
+        """Set payload and tool centre point, open the outputs, listen to what changes, arm the watchdog last."""
         set_tool(control, receive, clock, self._tool)
         with self._in_time():
             self.outputs = DigitalOutputs(self._address, bits=receive.getActualDigitalOutputBits() & ALL_BITS)
         self._links.look()
         self._pins.forget()
+        self._obedience.seed()
+        self._primary.begin(clock)
         arm_watchdog(control, receive, clock)  # from here on somebody must write

@@ -145,13 +145,13 @@ def set_tool(control: RTDEControlInterface, receive: RTDEReceiveInterface, clock
         ArmRefusedError: the controller has others.
     """
     tcp = [*tool.tcp_m, 0.0, 0.0, 0.0]
-    if not _carries(receive, tool):
+    if not carries(receive, tool):
         require(control.setPayload(tool.mass_kg, list(tool.com_m)), "setPayload", receive=receive, clock=clock)
     require(control.setTcp(tcp), "setTcp", receive=receive, clock=clock)
     if any(abs(a - b) > TCP_TOLERANCE for a, b in zip(control.getTCPOffset(), tcp, strict=True)):
         raise ArmRefusedError(f"expected tool centre point {tcp}, the controller says {control.getTCPOffset()}")
     deadline_ns = monotonic_ns() + round(PROOF_S * 1e9)
-    while not _carries(receive, tool):
+    while not carries(receive, tool):
         if monotonic_ns() > deadline_ns:
             raise ArmRefusedError(
                 f"expected payload {tool.mass_kg} kg at {[*tool.com_m]} m of the flange, "
@@ -160,7 +160,7 @@ def set_tool(control: RTDEControlInterface, receive: RTDEReceiveInterface, clock
         clock.wait_tick()
 
 
-def _carries(receive: RTDEReceiveInterface, tool: Tool) -> bool:
+def carries(receive: RTDEReceiveInterface, tool: Tool) -> bool:
     """Return whether the controller reckons with a tool's mass and centre of mass."""
     off_m = [abs(a - b) for a, b in zip(receive.getPayloadCog(), tool.com_m, strict=True)]
     return abs(receive.getPayload() - tool.mass_kg) <= PAYLOAD_TOLERANCE_KG and max(off_m) <= CENTRE_TOLERANCE_M

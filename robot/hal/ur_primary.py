@@ -2,7 +2,8 @@
 
 Layout: UR, "Remote control via TCP/IP" (client interfaces): a package is a uint32 size and a uint8 type; robot state
 (type 16) is a sequence of sub-packages of the same form. What greets a client is a robot message (type 20): a uint64
-stamp, a source, a type (3), a counted name, and the version as two uint8 and two int32. Numbers are big-endian.
+stamp, a source, a type (3), a counted name, and the version as two uint8 and two int32. A key message (type 7) has a
+code and an argument (int32), a counted title and a text. Numbers are big-endian.
 """
 
 import socket
@@ -14,11 +15,21 @@ import msgspec
 from robot.errors import WireError
 from robot.messages import Vec6
 
-__all__ = ["PRIMARY_PORT", "ArmFacts", "parse_facts", "parse_greeting", "read_facts"]
+__all__ = [
+    "PRIMARY_PORT",
+    "ArmFacts",
+    "KeyMessage",
+    "parse_facts",
+    "parse_greeting",
+    "parse_key",
+    "parse_tool",
+    "read_facts",
+    "split_packages",
+]
 
 PRIMARY_PORT = 30001
 ROBOT_STATE, JOINTS, CARTESIAN, KINEMATICS, CONFIGURATION = 16, 1, 4, 5, 6
-ROBOT_MESSAGE, VERSION = 20, 3
+ROBOT_MESSAGE, VERSION, KEY = 20, 3, 7
 JOINT_BYTES = 41
 LARGEST = 1 << 16
 _HEADER = struct.Struct(">IB")
@@ -26,6 +37,7 @@ _VEC6 = struct.Struct(">6d")
 _DOUBLE = struct.Struct(">d")
 _RANGES = struct.Struct(">12d")
 _MESSAGE, _NUMBERS = struct.Struct(">QbBB"), struct.Struct(">BBi")
+_KEY = struct.Struct(">QbBiiB")
 
 
 class ArmFacts(msgspec.Struct, frozen=True, kw_only=True):
@@ -79,6 +91,52 @@ def parse_greeting(package: bytes) -> tuple[int, ...] | None:
     if kind != VERSION or len(package) < at + _NUMBERS.size:
         return None
     return _NUMBERS.unpack_from(package, at)
+
+
+class KeyMessage(msgspec.Struct, frozen=True, kw_only=True):
+    """What a controller tells as it happens, such as that a program was started."""
+
+    title: str
+    text: str
+
+
+def parse_key(package: bytes) -> KeyMessage | None:
+    """Return a key message, None where a package is something else."""
+    at = _HEADER.size
+    if len(package) < at + _KEY.size or package[4] != ROBOT_MESSAGE:
+        return None
+    _, _, kind, _, _, n_title = _KEY.unpack_from(package, at)
+    if kind != KEY:
+        return None
+    at += _KEY.size
+    title, text = package[at : at + n_title], package[at + n_title :]
+    return KeyMessage(title=title.decode("utf-8", "replace"), text=text.decode("utf-8", "replace"))
+
+
+def parse_tool(package: bytes) -> Vec6 | None:
+    """Return the tool that is set, in the flange frame; None where a package does not carry it."""
+    if len(package) < _HEADER.size or package[4] != ROBOT_STATE:
+        return None
+    cartesian = dict(_sub_packages(package)).get(CARTESIAN, b"")
+    return _VEC6.unpack_from(cartesian, _VEC6.size) if len(cartesian) >= 2 * _VEC6.size else None
+
+
+def split_packages(stream: bytes) -> tuple[list[bytes], bytes]:
+    """Return the whole packages at a stream's beginning, and what is left of it.
+
+    Raises:
+        WireError: this is no such stream.
+    """
+    packages, at = [], 0
+    while len(stream) - at >= _HEADER.size:
+        size, _ = _HEADER.unpack_from(stream, at)
+        if not _HEADER.size <= size <= LARGEST:
+            raise WireError(f"primary interface: expected a package of 5 to {LARGEST} bytes, came {size}")
+        if len(stream) - at < size:
+            break
+        packages.append(stream[at : at + size])
+        at += size
+    return packages, stream[at:]
 
 
 def read_facts(
