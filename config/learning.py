@@ -60,7 +60,7 @@ class GoalSelection(Section, frozen=True, kw_only=True):
 class SubgoalSelection(Section, frozen=True, kw_only=True):
     """The choice of sub-goals, once a trial."""
 
-    kind: OneOf["q", "q_hindsight", "graph"] = "graph"
+    kind: OneOf["q", "q_hindsight", "q_drop", "mdp", "direct", "graph"] = "graph"
     temperature: OneOf["one_minus_improvement", "one_minus_competence", "fixed"] = "one_minus_competence"
     temperature_least: Positive = 0.01
     temperature_scale: NonNegative = 0.59

@@ -16,6 +16,7 @@ from config.limit_checks import check_limits, check_limits_fit, check_profile_na
 from config.limited import limited
 from config.limits import LimitsFile
 from config.placing import check_fit, check_placing
+from config.preset import grown
 from config.resolved import Resolved
 from config.rig import DEFAULT_LIMITS, Rig
 from config.rules import RuleSet
@@ -75,7 +76,7 @@ def load_rig(name: str | Path) -> Rig:
 
 
 def load_learning(name: str | Path) -> LearningConfig:
-    """Return a learner's preset: `default`, `paper`, `group`, or a path."""
+    """Return a learner's preset: `default`, `paper`, `group`, ... (config/learning), or a path."""
     return _load_learning(read_source("learning", name))
 
 
@@ -258,7 +259,19 @@ def _from(folder: Path, name: str) -> str:
 
 
 def _load_learning(source: Source) -> LearningConfig:
-    learning = _decode(source, LearningConfig)
+    return _shipped_learning(source) if source.folder is None else _read_learning(source)
+
+
+@lru_cache(maxsize=KEPT)
+def _shipped_learning(source: Source) -> LearningConfig:
+    return _read_learning(source)
+
+
+def _read_learning(source: Source) -> LearningConfig:
+    whole, told = grown(source)
+    for tree, file in told:
+        decode(tree, LearningConfig, file)  # a mistake is one of the file that it is in
+    learning = decode(whole, LearningConfig, source.file)
     check_learning(learning, source.file)
     return learning
 

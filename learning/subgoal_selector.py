@@ -1,10 +1,11 @@
 """The sub-goal selector: which goal to try next on the way to the wanted one, once a trial.
 
-Three implementations of one protocol (learning/interfaces.py), chosen by name in the config:
+Implementations of one protocol (learning/interfaces.py), chosen by name in the config:
 
 * `q`: Q-learning over goal-states, as the paper has it;
 * `q_hindsight`: the same, learning about every goal from each trial, with replay;
-* `graph`: a posterior over each goal's preconditions, and a plan.
+* `graph`: a posterior over each goal's preconditions, and a plan;
+* `direct`, `mdp`, `q_drop`: what is found elsewhere, to compare with (learning/subgoal_baselines.py).
 """
 
 from importlib import import_module
@@ -19,6 +20,9 @@ __all__ = ["SELECTORS", "make_subgoal_selector"]
 SELECTORS = {
     "q": "learning.subgoal_q:QSelector",
     "q_hindsight": "learning.subgoal_q:QHindsightSelector",
+    "q_drop": "learning.subgoal_baselines:DropSelector",
+    "mdp": "learning.subgoal_baselines:MdpSelector",
+    "direct": "learning.subgoal_baselines:DirectSelector",
     "graph": "learning.subgoal_graph:GraphSelector",
 }
 

@@ -19,7 +19,7 @@ ROOT = Path(__file__).parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
 ROOMS = ("config", "learning", "perception", "robot", "sim_twin")
 EDGES = {
-    "abstract.bench", "abstract.learner", "abstract.protocol", "abstract.rules", "abstract.table",
+    "abstract.baselines", "abstract.bench", "abstract.learner", "abstract.protocol", "abstract.rules", "abstract.table",
     "agent", "assembly", "assess", "bench", "checkpoint", "cli", "consent", "demonstrations", "ended", "errors",
     "evaluation", "evaluation_pool", "experiment", "explain", "figures", "fingerprint", "goals", "metrics",
     "offline", "preceding", "progress", "provenance", "recorded", "recording", "replaying", "report",

@@ -54,7 +54,7 @@ TYPES = [
     case("too few joints", "arm", ["joints", 5], ..., "joints", "a list of 6, each a mapping", "a list of 5"),
     case("too great", "scenario", ["boxes", 0, "lid", "output"], 99, "boxes[0].lid.output", "from 0 up to 15", "99"),
     case("not above", "arm", ["servo", "gain"], 0, "servo.gain", "a number from 100 up to 2000", "0"),
-    case("choice", "learning", ["subgoal_selection", "kind"], "magic", "subgoal_selection.kind", "one of graph, q, q_hindsight", "'magic'"),
+    case("choice", "learning", ["subgoal_selection", "kind"], "magic", "subgoal_selection.kind", "one of direct, graph, mdp, q, q_drop, q_hindsight", "'magic'"),
     case("goal kind", "scenario", ["goals", 0, "kind"], "pushed", "goals[0].kind", "one of pressed, grabbed, in_box", "'pushed'"),
     case("key like a path", "rig", ["x` - at `$.foo"], 1, "", "the keys name, description, arm", "'x` - at `$.foo'"),
     case("key like a path below", "scenario", ["boxes", 1, "lid", "x` - at `$.foo[3]"], 1, "boxes[1].lid", "the keys output", "'x` - at `$.foo[3]'"),
