@@ -1,5 +1,8 @@
 """`autotelic cell`: walk through a cell's wires with a person, or with the truth of a virtual table. The edge."""
 
+import os
+import stat
+import sys
 import time
 from collections.abc import Callable
 from contextlib import AbstractContextManager, ExitStack
@@ -72,7 +75,7 @@ def _walk(resolved: Resolved, *, is_auto: bool) -> list[Finding]:
             "on this machine's loopback there are virtual controllers, anywhere else real ones"
         )
     with ExitStack() as stack:
-        somebody = stack.enter_context(_truth_of(rig)) if is_auto else _Person()
+        somebody = stack.enter_context(_truth_of(rig)) if is_auto else _person()
         terminals = stack.enter_context(UrTerminals(rig.address))
         check_serial(terminals.serial, rig.expected.serial, rig.address)
         inputs, outputs = wires_of(resolved.scenario, cell)
@@ -104,6 +107,20 @@ def wires_of(scenario: Scenario, cell: CellConfig) -> tuple[tuple[Wire, ...], tu
         if w.signal in driven
     )
     return inputs, outputs
+
+
+def _person() -> Somebody:
+    """Return whoever answers on standard input.
+
+    Raises:
+        RobotConfigError: nobody can.
+    """
+    if sys.stdin.isatty() or not stat.S_ISCHR(os.fstat(sys.stdin.fileno()).st_mode):
+        return _Person()
+    raise RobotConfigError(
+        "cell test: expected a person at a terminal, who presses and looks; standard input is none (of a virtual "
+        "controller --auto asks its truth instead)"
+    )
 
 
 class _Person(Somebody):

@@ -13,6 +13,7 @@ from time import monotonic_ns
 
 from robot.errors import WireError
 from robot.hal.protocols import Clock
+from robot.hal.ur_calls import what_to_try
 from robot.hal.ur_primary import PRIMARY_PORT, parse_key, parse_tool, split_packages
 from robot.messages import Vec6
 
@@ -51,7 +52,10 @@ class PrimaryWatch:
         try:
             self._link = socket.create_connection(self._at, timeout=CONNECT_S)
         except OSError as error:
-            raise WireError(f"primary interface: expected an answer at {host}:{port}, got {error}") from error
+            said = f"{error or 'none in time'}"
+            raise WireError(
+                f"primary interface: expected an answer at {host}:{port}, got {said}; {what_to_try(said)}"
+            ) from error
         self._poll = poll()
         self._poll.register(self._link, POLLIN)
         n_states, end_ns = 0, monotonic_ns() + round(SETTLE_S * 1e9)

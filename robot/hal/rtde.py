@@ -284,7 +284,7 @@ class RtdeArm:
     def _note_freshness(self, receive: RTDEReceiveInterface) -> None:
         """Judge age by the controller's own time: the client says connected, and serves old data, after a drop."""
         timestamp, now_ns = receive.getTimestamp(), monotonic_ns()
-        if timestamp != self._last_timestamp:
+        if timestamp > self._last_timestamp:  # not one that is no number, nor one of before
             self._last_timestamp, self._seen_ns = timestamp, now_ns
         elif now_ns - self._seen_ns > STALE_NS:
             age_ms = (now_ns - self._seen_ns) / 1e6

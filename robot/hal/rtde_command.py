@@ -22,6 +22,7 @@ from robot.hal.primary_watch import PrimaryWatch
 from robot.hal.protocols import Clock
 from robot.hal.rtde_links import RtdeLinks
 from robot.hal.rtde_outputs import N_OUTPUTS, DigitalOutputs
+from robot.hal.rtde_probe import probe_upload
 from robot.hal.rtde_set_up import arm_watchdog, carries, end_program, prove_watchdog, set_tool
 from robot.hal.ur_calls import bounded
 from robot.messages import Vec6
@@ -210,6 +211,7 @@ class RtdeCommand:
         return StaleStateError(f"{what}: expected it sent, the client lost its link and does not get it back: {error}")
 
     def _connected(self) -> RTDEControlInterface:
+        probe_upload(self._address)
         self._links.when_uploading()
         with self._in_time():
             control = RTDEControlInterface(self._address, RATE_HZ, RTDEControlInterface.FLAG_UPLOAD_SCRIPT)

@@ -1,4 +1,4 @@
-"""Asks an RTDE port whether anybody answers, before the client does, which would wait for ever.
+"""Asks ports whether anybody answers, before the client does: it would wait for ever, or leave something behind.
 
 Protocol: UR, "Real-Time Data Exchange (RTDE) guide": a package is a uint16 size and a uint8 type; a request for
 protocol version 2 (type V) is answered by one byte.
@@ -8,10 +8,13 @@ import socket
 import struct
 
 from robot.errors import WireError
+from robot.hal.ur_calls import what_to_try
 
-__all__ = ["RTDE_PORT", "probe_rtde"]
+__all__ = ["RTDE_PORT", "UPLOAD_PORT", "probe_rtde", "probe_upload"]
 
 RTDE_PORT = 30004
+UPLOAD_PORT = 30003
+"""Where the client sends its program."""
 _HEADER = struct.Struct(">HB")
 _VERSION = ord("V")
 _ASK = _HEADER.pack(5, _VERSION) + b"\x00\x02"
@@ -44,3 +47,18 @@ def probe_rtde(host: str, *, timeout_s: float = 2.0) -> None:
     size, kind = _HEADER.unpack_from(answer)
     if (size, kind, answer[-1]) != (_HEADER.size + 1, _VERSION, 1):
         raise WireError(f"{where} with protocol version 2, came {answer.hex()}")
+
+
+def probe_upload(host: str, *, timeout_s: float = 2.0) -> None:
+    """Connect to the port that takes programs, and disconnect: nothing is sent.
+
+    Raises:
+        WireError: nobody listens. Nothing of ours is on the arm then.
+    """
+    try:
+        socket.create_connection((host, UPLOAD_PORT), timeout=timeout_s).close()
+    except OSError as error:
+        said = f"{error or 'no answer in time'}"
+        raise WireError(
+            f"program upload: expected an answer at {host}:{UPLOAD_PORT}, got {said}; {what_to_try(said)}"
+        ) from error

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from robot.errors import WireError
 
-__all__ = ["bounded", "named"]
+__all__ = ["bounded", "named", "what_to_try"]
 
 HINTS = (
     ("start control script", "is it in remote control, and do its ports 30001 to 30003 answer?"),
@@ -29,8 +29,14 @@ def named(what: str, address: str) -> Iterator[None]:
         yield
     except RuntimeError as error:
         said = str(error)
-        hint = next((hint for words, hint in HINTS if words in said.lower()), TRY_ELSE)
-        raise WireError(f"{what}: expected an answer at {address}, got: {said.rstrip('. ')}; {hint}") from error
+        raise WireError(
+            f"{what}: expected an answer at {address}, got: {said.rstrip('. ')}; {what_to_try(said)}"
+        ) from error
+
+
+def what_to_try(said: str) -> str:
+    """Return what somebody may try where a connection failed with these words."""
+    return next((hint for words, hint in HINTS if words in said.lower()), TRY_ELSE)
 
 
 @contextmanager

@@ -92,7 +92,7 @@ class UrObserver:
         if receive is None:
             raise StaleStateError("arm: expected connect() before looking at it; nothing was seen")
         now_ns, timestamp_s = monotonic_ns(), receive.getTimestamp()
-        if timestamp_s != self._timestamp_s:
+        if timestamp_s > self._timestamp_s:
             self._timestamp_s, self._changed_ns = timestamp_s, now_ns
         elif now_ns - self._changed_ns > STALE_NS:
             raise StaleStateError(

@@ -13,6 +13,7 @@ from collections.abc import Callable, Sequence
 import msgspec
 
 from robot.errors import WireError
+from robot.hal.ur_calls import what_to_try
 from robot.messages import Vec6
 
 __all__ = [
@@ -168,7 +169,9 @@ def read_facts(
                 if facts is not None:
                     return facts
     except OSError as error:
-        raise WireError(f"primary interface: expected an answer at {host}:{PRIMARY_PORT}, got {error}") from error
+        raise WireError(
+            f"primary interface: expected an answer at {host}:{PRIMARY_PORT}, got {error}; {what_to_try(str(error))}"
+        ) from error
     raise WireError(f"primary interface: expected kinematics within {n_packages} packages, they did not come")
 
 

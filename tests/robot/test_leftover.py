@@ -88,3 +88,24 @@ def test_who_loses_the_arm_before_uploading_leaves_somebody_elses_program_alone(
     finally:
         client.close()
     assert runtime(host) == "PLAYING"
+
+
+@pytest.mark.slow
+def test_who_finds_nobody_to_upload_to_leaves_a_program_alone_that_is_sent_next(host):
+    resolved = resolve(rig="virtual_lab")
+    rig = msgspec.structs.replace(resolved.rig, address=host, bus=None)
+    client = ServoClient(msgspec.structs.replace(resolved, rig=rig))
+    try:
+        client.connect()
+        ask_fault(host, "program_stop")  # of a test before
+        ask_fault(host, "refuse", port=30003)
+        with pytest.raises(RobotError, match=r"program upload: expected an answer at .*30003") as told:
+            client.engage()
+        assert "a program that it left" not in str(told.value)
+        play(host)
+        sleep(1.0)
+        assert runtime(host) == "PLAYING"
+    finally:
+        ask_fault(host, "refuse", port=30003, on=False)
+        client.close()
+    assert runtime(host) == "PLAYING"
