@@ -8,6 +8,8 @@ times as long as in a loop of its own.
 
 import math
 
+import numpy as np
+
 from config.arm import ArmConfig
 from robot.chain import ToolChain, chain_tcp
 from robot.compiled import Table, compiled
@@ -96,6 +98,9 @@ class DownwardArm:
 
     Args:
         arm: The arm's file; one that `fits`.
+
+    Attributes:
+        reach: (3, 6) the arm's lengths, each joint's least angle and its greatest.
     """
 
     def __init__(self, arm: ArmConfig) -> None:
@@ -105,6 +110,7 @@ class DownwardArm:
         a, b, c, d, e, f = (joint.range_rad for joint in rows)
         self._low_rad = (a[0], b[0], c[0], d[0], e[0], f[0])
         self._high_rad = (a[1], b[1], c[1], d[1], e[1], f[1])
+        self.reach: Table = np.array([self._lengths, self._low_rad, self._high_rad])
 
     @staticmethod
     def fits(arm: ArmConfig) -> bool:

@@ -41,10 +41,13 @@ class Kinematics:
         arm: The arm's file.
         is_swift: Ask the closed form first, where the arm has one. It agrees with placo to placo's own tolerance, not
             to the last digit.
+
+    Attributes:
+        downward: That closed form; None where it is not asked.
     """
 
     def __init__(self, arm: ArmConfig, *, is_swift: bool = False) -> None:
-        self._downward = DownwardArm(arm) if is_swift and DownwardArm.fits(arm) else None
+        self.downward = DownwardArm(arm) if is_swift and DownwardArm.fits(arm) else None
         self.chain = ToolChain(arm)
         self._yaw_rad = arm.tool_yaw_rad
         self._low_rad, self._high_rad = zip(*(j.range_rad for j in arm.joints), strict=True)
@@ -81,8 +84,8 @@ class Kinematics:
         Raises:
             UnreachableError: nothing within range comes closer than the tolerance.
         """
-        if self._downward is not None:
-            found = self._downward.near(position_m, self._yaw_rad if yaw_rad is None else yaw_rad, seed_rad)
+        if self.downward is not None:
+            found = self.downward.near(position_m, self._yaw_rad if yaw_rad is None else yaw_rad, seed_rad)
             if found is not None:
                 return found
         self._set_yaw(self._yaw_rad if yaw_rad is None else yaw_rad)

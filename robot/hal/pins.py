@@ -89,6 +89,11 @@ class Pins:
         self.output_mask |= sum(drive.on_bit | drive.off_bit for drive in self._pulsed)
         self.longest_pulse_ns = max((drive.pulse_ns for drive in self._pulsed), default=0)
         self._told, self._known = 0, 0
+        self._in = (0, self._inputs.signals(0))
+        """Terminals that were read last, and their signals: mostly they are the same again."""
+        self._out = (0, self._levels.signals(0))
+        self._asked = (0, self._levels.pins(self._inverted_out))
+        """Signals that were asked for last, and their terminals."""
         self._pulse_end_ns: dict[int, int] = {}
 
     def forget(self) -> None:
@@ -104,11 +109,15 @@ class Pins:
 
     def signals_in(self, pins: int) -> int:
         """Return the inputs' signals."""
-        return self._inputs.signals(pins) ^ self._inverted_in
+        if pins != self._in[0]:
+            self._in = (pins, self._inputs.signals(pins))
+        return self._in[1] ^ self._inverted_in
 
     def signals_out(self, pins: int) -> int:
         """Return the outputs' signals: levels as read back, bistable drives as told last."""
-        return self._levels.signals(pins) ^ self._inverted_out | self._told
+        if pins != self._out[0]:
+            self._out = (pins, self._levels.signals(pins))
+        return self._out[1] ^ self._inverted_out | self._told
 
     def pins_out(self, signals: int, pins: int, *, now_ns: int) -> int:
         """Return the terminals for the signals wanted now; others stay as they are.
@@ -118,7 +127,9 @@ class Pins:
             pins: How the output terminals are.
             now_ns: Monotonic time, by which pulses begin and end.
         """
-        pins = pins & ~self.output_mask | self._levels.pins(signals ^ self._inverted_out)
+        if signals != self._asked[0]:
+            self._asked = (signals, self._levels.pins(signals ^ self._inverted_out))
+        pins = pins & ~self.output_mask | self._asked[1]
         for drive in self._pulsed:
             pins |= self._pulse(drive, bool(signals & drive.signal_bit), now_ns)
         return pins

@@ -177,12 +177,14 @@ class RtdeArm:
             self._modes, self._mode = modes, mode_of(*modes)
         self._outputs_read = receive.getActualDigitalOutputBits() & ALL_BITS
         x, y, z, rx, ry, rz = receive.getActualTCPPose()
-        vx, vy, vz, *_ = receive.getActualTCPSpeed()
-        fx, fy, fz, *_ = receive.getActualTCPForce()
+        vx, vy, vz, _, _, _ = receive.getActualTCPSpeed()
+        fx, fy, fz, _, _, _ = receive.getActualTCPForce()
+        j1, j2, j3, j4, j5, j6 = receive.getActualQ()
+        s1, s2, s3, s4, s5, s6 = receive.getActualQd()
         return ArmState(
             stamp_ns=self._seen_ns,
-            q_rad=_vec6(receive.getActualQ()),
-            qd_rad_s=_vec6(receive.getActualQd()),
+            q_rad=(j1, j2, j3, j4, j5, j6),
+            qd_rad_s=(s1, s2, s3, s4, s5, s6),
             tcp_position_m=(x, y, z),
             tcp_quat=quat_of_rotation_vector(rx, ry, rz),
             tcp_speed_m_s=(vx, vy, vz),

@@ -1,23 +1,24 @@
 """The set-point that follows a target: straight lines of the tool pointing down, or joints, jerk-limited either way."""
 
 import math
-from collections import deque
 from operator import le
 
 from config.arm import ArmConfig
 from robot.envelope import Envelope
-from robot.geometry import turn_about_vertical, unwound
+from robot.geometry import between, turn_about_vertical, unwound
 from robot.kinematics import Kinematics, UnreachableError
 from robot.messages import Vec3, Vec6
 from robot.motion.ahead import Ahead
 from robot.motion.chords import share_of_speed
-from robot.motion.free import free_bounds, is_free_step
+from robot.motion.commands import Commands
+from robot.motion.free import free_bounds
 from robot.motion.guarding import guarded_share, is_guarded
-from robot.motion.holding import Place, Points, slid
+from robot.motion.holding import Place, slid
 from robot.motion.lean import Lean
 from robot.motion.limiter import AxisLimits, Limiter
 from robot.motion.pacing import braked, part_way, window
 from robot.motion.swinging import SWING_S
+from robot.motion.upright import free_step, upright_step
 
 __all__ = ["SWIFT_TICK_S", "Follower"]
 
@@ -73,9 +74,8 @@ class Follower:
         """
         motion, joints = arm.motion, arm.joints
         self._envelope = envelope
-        self._n_past = round(SWING_S / tick_s) + 1
-        self._past: deque[Points] = deque(maxlen=self._n_past)
-        """Points of the last commands, the oldest two a step SWING_S ago."""
+        self._commands = Commands(round(SWING_S / tick_s) + 1)
+        """The oldest two are a step SWING_S ago."""
         self._fence_names = {fence.name for fence in envelope.fences}
         self._is_swift = tick_s < SWIFT_TICK_S
         self._kinematics = Kinematics(arm, is_swift=True)
@@ -101,6 +101,8 @@ class Follower:
             tick_s=tick_s,
         )
         self._joint_step_rad = _vec6([SPEED_SHARE * j.speed_rad_s * tick_s for j in joints])
+        self._chain_rows, downward = self._kinematics.chain.rows, self._kinematics.downward
+        self._reach = None if downward is None else downward.reach
         self._bounds = free_bounds(envelope, self._kinematics.chain, tip_min_m=tip_min_m)
         self.seed(arm.home_rad)
 
@@ -110,9 +112,7 @@ class Follower:
         self.trouble: str | None = None
         self.held: tuple[str, float] | None = None
         self._is_fenced = False
-        self._points = self._kinematics.chain.points(q_rad)
-        self._points_before = self._points[0]
-        self._past.extend([self._points_before] * self._n_past)
+        self._commands.seed(q_rad, self._kinematics.chain.points(q_rad))
         self.target_m = self._kinematics.tcp(q_rad)
         self.yaw_rad = self._home_yaw_rad
         self._is_upright = self._is_solved = False
@@ -170,7 +170,7 @@ class Follower:
     def _greatest_steps(self, to_m: Vec3) -> Vec3:
         """Return how far parts may go in a tick on the way to a place: low over the table the tool as guarded."""
         tcp_m, flange_m, elbow_m = self._envelope.part_step_m
-        if is_guarded(self._points[0][0], to_m, self._guard_z_m):
+        if is_guarded(self._commands.tcp_m, to_m, self._guard_z_m):
             tcp_m = min(tcp_m, self._guarded_m_s * self._tick_s)
         return tcp_m, flange_m, elbow_m
 
@@ -211,18 +211,14 @@ class Follower:
         self.trouble = self.held = None
         q = self._hold_back(q_rad, is_pushed=True)
         if self.held is None:
-            self._go_on(q, self._points[0][0])
+            self._go_on(q, self._commands.tcp_m)
         self._q_earlier_rad, self.q_before_rad, self.q_rad = self.q_before_rad, self.q_rad, q
         return q
 
     def step(self) -> Vec6:
         """Advance by one tick and return the joints to command."""
         self.trouble = self.held = None
-        q = self._step_tool() if self._is_upright else _vec6(self._joints.step())
-        if q != self.q_rad or q != self.q_before_rad:
-            q = self._hold_back(q)
-        else:
-            self._past.append(self._points[0])
+        q = self._step_tool() if self._is_upright else self._hold_back(_vec6(self._joints.step()))
         if self._tool.is_failed or self._joints.is_failed:
             self.trouble = "brake"
         self._q_earlier_rad, self.q_before_rad, self.q_rad = self.q_before_rad, self.q_rad, q
@@ -231,14 +227,32 @@ class Follower:
     def _step_tool(self) -> Vec6:
         if self._to_come is not None:
             self._take_target(self._to_come)
-        before = self._tool.at
-        now = self._slide(before, self._tool.step())
+        tool, commands, reach = self._tool, self._commands, self._reach
+        at = tool.at
+        x, y, z, _ = at
+        to = tool.step()
+        u, v, w, yaw = to
+        if reach is None or not self._lean.is_over or (to == at and self._is_solved):
+            return self._hold_back(self._followed(at, to))
+        is_free, q = upright_step(
+            commands.rows, commands.newest, (x, y, z), (u, v, w), yaw, self._chain_rows, reach, self._bounds,
+            self._envelope.joint_rows, self._envelope.fence_rows,
+        )  # fmt: skip
+        if not is_free:
+            return self._hold_back(self._followed(at, to))
+        commands.step()
+        self._is_solved = True
+        return q
+
+    def _followed(self, before: list[float], now: list[float]) -> Vec6:
+        """Return the joints of a tool that goes from a place to another, or where a fence leads it instead."""
+        now = self._slide(before, now)
         lean = self._lean
         if now == before and self._is_solved and lean.is_over:
             return self.q_rad  # at rest: solving again would stir the last digits
         self._is_solved = True
         x, y, z, yaw = now
-        ahead = _between(self.q_before_rad, self.q_rad, 2.0)
+        ahead = between(self.q_before_rad, self.q_rad, 2.0)
         try:
             q = self._kinematics.solve((x, y, z), ahead, yaw_rad=yaw)
             return q if lean.is_over else lean.step(q)
@@ -285,40 +299,36 @@ class Follower:
         It is brought back towards the step of an arm that brakes; motion goes on from there.
         """
         chain, now, envelope, ends = self._kinematics.chain, self.q_rad, self._envelope, self._envelope.joints
-        steps = (q, now, self.q_before_rad, self._q_earlier_rad)
-        is_free, points = is_free_step(
-            steps, self._points_before, self._points, (self._past[0], self._past[1]), chain.rows, self._bounds,
-            envelope.joint_rows, envelope.fence_rows, self._is_upright,
-        )  # fmt: skip
-        if is_free:
-            self._move_on(points)
+        commands, is_straight = self._commands, self._is_upright
+        if free_step(
+            commands.rows, commands.newest, q, self._chain_rows, self._bounds, envelope.joint_rows,
+            envelope.fence_rows, is_straight,
+        ):  # fmt: skip
+            commands.step()
             return q
+        points, here = chain.points(q), commands.place
         within = window(now, self.q_before_rad, self._q_earlier_rad, ends)
         wanted = [a - b for a, b in zip(q, now, strict=True)]
         share, name, base = 1.0, "", wanted
         if not all(map(le, within.low, wanted)) or not all(map(le, wanted, within.high)):
             base = braked(now, self.q_before_rad, self._q_earlier_rad, ends, within)
             share, name = part_way(wanted, base, within.low, within.high), "joint_acceleration"
-        places, is_straight = (self._points_before, self._points, points), self._is_upright
-        met = self._ahead.met(now, wanted, places, (self._past[0], self._past[1]), is_straight=is_straight)
+        places = (commands.points_before, here, points)
+        met = self._ahead.met(now, wanted, places, commands.past, is_straight=is_straight)
         if met:
             if base is wanted:
                 base = braked(now, self.q_before_rad, self._q_earlier_rad, ends, within)
-            left, blamed = self._ahead.left(met, now, self._points, wanted, base, is_straight=is_straight)
+            left, blamed = self._ahead.left(met, now, here, wanted, base, is_straight=is_straight)
             if left < share:
                 share, name = left, blamed
         if share < 1.0:
             self.held = name, 1.0 - share
             self._is_fenced = self._is_fenced or name in self._fence_names
-            q = _moved(now, [b + share * (w - b) for w, b in zip(wanted, base, strict=True)])
+            q = _vec6([n + (b + share * (w - b)) for n, w, b in zip(now, wanted, base, strict=True)])
             points = chain.points(q)
             self._go_on(q, points[0][0], is_braking_kept=not is_pushed)
-        self._move_on(points)
+        commands.add(q, points)
         return q
-
-    def _move_on(self, points: Place) -> None:
-        self._points_before, self._points = self._points[0], points
-        self._past.append(points[0])
 
     def _go_on(self, q: Vec6, tcp_m: Vec3, *, is_braking_kept: bool = False) -> None:
         """Let the limiter in charge go on from joints that are other than it said."""
@@ -331,7 +341,7 @@ class Follower:
         tool, quat = self._tool, self._kinematics.chain.quat
         target = tool.target
         yaws = [unwound(turn_about_vertical(quat(at)), target[3]) for at in (before, now, q)]
-        places = (self._points_before[0], self._points[0][0], tcp_m)
+        places = (self._commands.points_before[0], self._commands.tcp_m, tcp_m)
         moves = ([*place, yaw] for place, yaw in zip(places, yaws, strict=True))
         tool.go_on(*moves, is_braking_kept=is_braking_kept)
         tool.aim(target)
@@ -380,17 +390,9 @@ class Follower:
         except UnreachableError:
             return False
         largest = max(abs(a - b) for a, b in zip(q, now, strict=True))
-        self.aim_joints(_between(now, q, min(1.0, ALIGN_STEP_RAD / largest)) if largest > 0.0 else q)
+        self.aim_joints(between(now, q, min(1.0, ALIGN_STEP_RAD / largest)) if largest > 0.0 else q)
         self.yaw_rad = yaw_rad
         return True
-
-
-def _moved(q: Vec6, steps: list[float]) -> Vec6:
-    return _vec6([a + b for a, b in zip(q, steps, strict=True)])
-
-
-def _between(a: Vec6, b: Vec6, share: float) -> Vec6:
-    return _vec6([u + share * (v - u) for u, v in zip(a, b, strict=True)])
 
 
 def _vec6(x: list[float]) -> Vec6:

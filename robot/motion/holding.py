@@ -37,6 +37,7 @@ __all__ = [
     "share_of_way",
     "share_of_way_back",
     "slid",
+    "slid_to",
     "speed_step",
     "stops_outside",
     "stretch",
@@ -328,8 +329,8 @@ def led_out(target_m: Vec3, envelope: Envelope) -> tuple[Vec3, str]:
 
 
 @compiled
-def _slid(now_m: Vec3, to_m: Vec3, fences: Table, law: Vec3) -> tuple[Vec3, int]:
-    """Return the same by number, -1 where no fence changed it; the law is Envelope's far, braking and onset."""
+def slid_to(now_m: Vec3, to_m: Vec3, fences: Table, law: Vec3) -> tuple[Vec3, int]:
+    """Return what `slid` does, by number, -1 where none changed it; the law is Envelope's far, braking and onset."""
     far_m, braking_m, onset = law
     last = -1
     for k in range(fences.shape[0]):
@@ -360,7 +361,7 @@ def slid(now_m: Vec3, to_m: Vec3, envelope: Envelope) -> tuple[Vec3, str]:
         The place, and the name of the last fence that changed it, empty where none did.
     """
     law = (envelope.fence_far_m, envelope.fence_braking_m, envelope.onset)
-    place_m, last = _slid(now_m, to_m, envelope.fence_rows, law)
+    place_m, last = slid_to(now_m, to_m, envelope.fence_rows, law)
     return place_m, envelope.fences[last].name if last >= 0 else ""
 
 

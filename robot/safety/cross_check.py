@@ -13,7 +13,17 @@ from robot.geometry import stepped
 from robot.messages import ArmState, Vec3, Vec6
 from robot.safety.checks import Reason, Refusal
 
-__all__ = ["FREE_N", "LASTING_NS", "SHARE", "SPEED_M_S", "CrossCheck", "check_free", "check_tool_speed", "tool_speed"]
+__all__ = [
+    "FREE_N",
+    "LASTING_NS",
+    "SHARE",
+    "SPEED_M_S",
+    "CrossCheck",
+    "check_free",
+    "check_tool_speed",
+    "speed_of_tool",
+    "tool_speed",
+]
 
 SPEED_M_S, SHARE = 0.03, 0.05
 """How far the two speeds may be apart: a constant part and a share of ours. Links 2 mm longer than in the file differ
@@ -44,6 +54,15 @@ class CrossCheck:
         self._differs_since_ns: int | None = None
         self._is_first = True
 
+    @property
+    def is_first(self) -> bool:
+        """Whether nothing was asked yet."""
+        return self._is_first
+
+    def agree(self) -> None:
+        """Take note that the two belong together now, as somebody else has found out."""
+        self._differs_since_ns = None
+
     def check(self, state: ArmState) -> Refusal | None:
         """Refuse a measurement whose parts cannot belong to the arm and the tool that we know."""
         is_first, self._is_first = self._is_first, False
@@ -64,7 +83,8 @@ class CrossCheck:
 
 
 @compiled
-def _tool_speed(q_rad: Vec6, qd_rad_s: Vec6, rows: Table, tcp_m: Vec3) -> Vec3:
+def speed_of_tool(q_rad: Vec6, qd_rad_s: Vec6, rows: Table, tcp_m: Vec3) -> Vec3:
+    """Return what `tool_speed` does, of joints and their speeds."""
     x1, y1, z1 = chain_tcp(stepped(q_rad, qd_rad_s, STEP_S), rows, tcp_m)
     x0, y0, z0 = chain_tcp(stepped(q_rad, qd_rad_s, -STEP_S), rows, tcp_m)
     return (x1 - x0) / (2.0 * STEP_S), (y1 - y0) / (2.0 * STEP_S), (z1 - z0) / (2.0 * STEP_S)
@@ -72,7 +92,7 @@ def _tool_speed(q_rad: Vec6, qd_rad_s: Vec6, rows: Table, tcp_m: Vec3) -> Vec3:
 
 def tool_speed(chain: ToolChain, state: ArmState) -> Vec3:
     """Return the tool centre point's velocity by our model from the measured joints, base frame, m/s."""
-    return _tool_speed(state.q_rad, state.qd_rad_s, chain.rows, chain.tcp_m)
+    return speed_of_tool(state.q_rad, state.qd_rad_s, chain.rows, chain.tcp_m)
 
 
 def check_tool_speed(ours_m_s: Vec3, reported_m_s: Vec3) -> Refusal | None:

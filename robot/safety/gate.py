@@ -3,11 +3,15 @@
 import math
 from collections.abc import Callable
 
+import numpy as np
+
 from robot.as_came import AsCame, as_came
 from robot.chain import ToolChain
+from robot.compiled import Table
 from robot.envelope import Envelope
 from robot.hal.protocols import Arm
-from robot.messages import ArmCommand, ArmState, Outcome, Vec6, Verdict
+from robot.messages import ArmCommand, ArmMode, ArmState, GripCommand, Outcome, Vec6, Verdict
+from robot.safety.at_once import FREE, UNSURE, passed_at_once
 from robot.safety.blocks import Block
 from robot.safety.checks import (
     Reason,
@@ -35,6 +39,7 @@ from robot.safety.checks_profile import (
     check_soft_margin,
 )
 from robot.safety.course import JointCourse
+from robot.safety.cover import nothing_seen
 from robot.safety.cross_check import CrossCheck
 from robot.safety.limits import GateLimits
 from robot.safety.plain import is_plain, plain_bounds
@@ -77,7 +82,13 @@ class Gate:
         self._sequence = 0
         self._force_before_n = 0.0
         self._course = JointCourse(envelope)
-        self._points = chain.points(self._course.last_rad)[0]
+        self._memory: Table = np.array([_flat(chain.points(self._course.last_rad)[0])])
+        """Where the last command brought the parts."""
+        self._quiet_n = min(limits.contact_n, limits.hard_n, limits.force_max_n)
+        self._grip: GripCommand | None = None
+        """What the hand was asked when a command passed all checks one by one."""
+        self._unlooked = (np.zeros((1, 2)), nothing_seen(), np.zeros((2, 6)))
+        """What a StopCheck knows, where there is none: nothing."""
         self._bounds = plain_bounds(limits, envelope, chain)
         self._is_pushed = False
         self._intent_ns = 0
@@ -115,6 +126,7 @@ class Gate:
         """Start from the measured joints at rest, latch cleared. For the station, after arming or a reset only."""
         self._course.seed(state.q_rad)
         self._points = self._chain.points(state.q_rad)[0]
+        self._grip = None
         self._sequence = 0
         self._force_before_n = 0.0
         self._intent_ns = state.stamp_ns
@@ -159,13 +171,67 @@ class Gate:
         came = None if refused is None else as_came(refused)
         return self._refuse(Refusal(reason, detail), stamp_ns=now_ns, refused=came)
 
+    @property
+    def _points(self) -> Points:
+        a, b, c, d, e, f, g, h, i = self._memory[0].tolist()
+        return (a, b, c), (d, e, f), (g, h, i)
+
+    @_points.setter
+    def _points(self, points: Points) -> None:
+        self._memory[0] = _flat(points)
+
     def _check(self, command: ArmCommand, state: ArmState, now_ns: int) -> Refusal | None:
+        """Say why not: check by check, unless a command is finite and all the others pass it at once."""
+        refusal = check_finite(command)
+        if refusal is not None:
+            return refusal
+        force_n, stops = math.hypot(*state.tcp_force_n), self._stops
+        said = self._at_once(command, state, now_ns) if force_n <= self._quiet_n else UNSURE
+        if said == UNSURE:
+            return self._check_each(command, state, now_ns, force_n)
+        self._force_before_n, self._is_pushed = force_n, False
+        if self._cross is not None:
+            self._cross.agree()
+        if stops is None:
+            return None
+        if said == FREE:
+            stops.note(command.q_rad)
+            return None
+        return stops.check(command.q_rad, self._course.last_rad, state)
+
+    def _at_once(self, command: ArmCommand, state: ArmState, now_ns: int) -> int:
+        """Return what passed_at_once says of a command that moves and whose tags are in order; otherwise UNSURE."""
+        limits, course, stops, cross = self._limits, self._course, self._stops, self._cross
+        q, last_rad, befores = command.q_rad, course.last_rad, course.only
+        oldest_ns = now_ns - limits.state_max_age_ns
+        is_in_order = (
+            befores is not None
+            and command.sequence == self._sequence + 1
+            and oldest_ns <= state.stamp_ns <= now_ns
+            and oldest_ns <= command.stamp_ns <= now_ns
+            and state.mode is ArmMode.RUNNING
+            and command.grip is self._grip
+            and not command.digital_out & ~limits.output_mask
+            and self._force_before_n <= limits.contact_n
+            and cross is not None
+            and not cross.is_first
+            and 0 <= now_ns - self._intent_ns <= limits.intent_max_age_ns
+            and (self._percept_ns is None or 0 <= now_ns - self._percept_ns <= limits.percept_max_age_ns)
+            and (stops is None or stops.follows(last_rad))
+        )
+        if befores is None or not is_in_order or q == last_rad:
+            return UNSURE
+        known, seen, law = self._unlooked if stops is None else (stops.known, stops.seen, stops.law)
+        return passed_at_once(
+            (q, last_rad, *befores), (state.q_rad, state.qd_rad_s), state.tcp_speed_m_s, self._memory, known, seen,
+            law, self._chain.rows, self._bounds, self._envelope.joint_rows, self._envelope.fence_rows,
+        )  # fmt: skip
+
+    def _check_each(self, command: ArmCommand, state: ArmState, now_ns: int, force_n: float) -> Refusal | None:
         """Run the checks in their order. Of a command that holds still it is asked whether it may so soon."""
         limits = self._limits
-        force_n = math.hypot(*state.tcp_force_n)
         refusal = (
-            check_finite(command)
-            or check_sequence(command, self._sequence)
+            check_sequence(command, self._sequence)
             or check_state(state, command, now_ns, limits)
             or check_force(force_n, self._force_before_n, limits)
             or self._check_push(command.q_rad, state)
@@ -175,7 +241,7 @@ class Gate:
         )
         if refusal is not None:
             return refusal
-        self._force_before_n = force_n
+        self._force_before_n, self._grip = force_n, command.grip
         q, last_rad = command.q_rad, self._course.last_rad
         self._is_pushed = force_n > limits.hard_n
         pushed_rad = state.q_rad if self._is_pushed else None
@@ -262,3 +328,8 @@ class Gate:
             is_latched=True,
             refused=refused,
         )
+
+
+def _flat(points: Points) -> tuple[float, ...]:
+    (a, b, c), (d, e, f), (g, h, i) = points
+    return a, b, c, d, e, f, g, h, i

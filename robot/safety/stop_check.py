@@ -17,7 +17,7 @@ from robot.safety.limits import GateLimits
 from robot.safety.stopping import Braking
 from robot.safety.sweep import Links, Sweep, swept_m
 
-__all__ = ["StopCheck"]
+__all__ = ["StopCheck", "looked_ahead"]
 
 FINE_M = 0.001
 """Ways shorter than this hide nothing between their ends."""
@@ -39,7 +39,7 @@ Known = Pair
 
 
 @compiled
-def _looked_ahead(
+def looked_ahead(
     q_rad: Vec6, before_rad: Vec6, known: Known, seen: Table, far_m: Vec6, links_m: Links, law: Pair
 ) -> tuple[Known, bool, float, Vec6, float]:
     """Return what a command leads to when the arm is stopped after it, braking at the worst.
@@ -143,6 +143,12 @@ class StopCheck:
     Nothing of the arm moves farther than the joints' turns times their reaches, so that a gap found at one posture is
     a bound on the gaps near it, and most ticks need no evaluation, nearly all others one. Angles and fences are
     asked of where the arm comes to rest, fences halfway too, bodies of the whole way there: braking at its worst.
+
+    Attributes:
+        known: (1, 2) where the last command led all parts are so far inside their fences at least, and every joint so
+            far inside its range.
+        seen: The gaps that were found last (cover).
+        law: (2, 6) the sweep's reaches; its links, and how a stop brakes.
     """
 
     def __init__(
@@ -173,22 +179,30 @@ class StopCheck:
         self._fences = () if envelope is None else envelope.fences
         self._fence_rows = NO_FENCES if envelope is None else envelope.fence_rows
         self._law = (1.0 / (2.0 * tick_s * tick_s * braking.least_rad_s2), lead_s / tick_s)
+        sweep = self._sweep
+        self.law: Table = np.array([sweep.far_m, (*sweep.links_m, *self._law, 0.0, 0.0)])
+        self.known: Table = np.zeros((1, 2))
         self.seed()
 
     def seed(self) -> None:
         """Forget what was found: the next command is looked at afresh."""
-        self._fence_m = 0.0
-        """Where the last command led all parts are so far inside their fences at least,"""
-        self._range_rad = 0.0
-        """and every joint so far inside its range."""
-        self._seen, self._n_seen = nothing_seen(), 0
+        self.known[:] = 0.0
+        self.seen, self._n_seen = nothing_seen(), 0
         self._at: Vec6 | None = None
         """Where the last command led that was looked at."""
 
     def put(self, blocks: tuple[Block, ...]) -> None:
         """Take things to be where they are now: what was found of gaps holds no more."""
         self._clearance.put(blocks)
-        self._seen = nothing_seen()
+        self.seen = nothing_seen()
+
+    def follows(self, before_rad: Vec6) -> bool:
+        """Return whether what is known holds for the command after these joints."""
+        return before_rad == self._at
+
+    def note(self, q_rad: Vec6) -> None:
+        """Take note of a command whose stop somebody else has found free, and kept `known` up."""
+        self._at = q_rad
 
     def check(self, q_rad: Vec6, before_rad: Vec6, state: ArmState) -> Refusal | None:
         """Refuse joints from which a stop would end outside the limits or pass too near to something.
@@ -213,11 +227,12 @@ class StopCheck:
 
     def _check_step(self, q_rad: Vec6, before_rad: Vec6, from_rad: Vec6) -> Refusal | None:
         """Look at the stop of a command that is as fast as if it came from some joints in one tick."""
-        sweep, known = self._sweep, (self._fence_m, self._range_rad)
-        known, is_limit_near, covered, end, ahead_m = _looked_ahead(
-            q_rad, from_rad, known, self._seen, sweep.far_m, sweep.links_m, self._law
+        sweep = self._sweep
+        fence_m, range_rad = self.known[0].tolist()
+        known, is_limit_near, covered, end, ahead_m = looked_ahead(
+            q_rad, from_rad, (fence_m, range_rad), self.seen, sweep.far_m, sweep.links_m, self._law
         )
-        self._fence_m, self._range_rad = known
+        self.known[0] = known
         if is_limit_near:
             refusal = self._check_limits(q_rad, end)
             if refusal is not None:
@@ -233,7 +248,7 @@ class StopCheck:
             share, before = min(1.0, covered + stride), covered
             if self._gap(between(q, end, share)) <= 0.0:
                 return False
-            covered = covered_share(q, end, length_m, self._seen, sweep.far_m, sweep.links_m)
+            covered = covered_share(q, end, length_m, self.seen, sweep.far_m, sweep.links_m)
             if covered > 1.0:
                 return True
             if covered <= before:
@@ -243,7 +258,7 @@ class StopCheck:
     def _gap(self, q: Vec6) -> float:
         """Return the gap at joints, and remember it."""
         gap_m = self._clearance.gap(q)
-        self._seen[self._n_seen % N_SEEN] = (*q, gap_m)
+        self.seen[self._n_seen % N_SEEN] = (*q, gap_m)
         self._n_seen += 1
         return gap_m
 
@@ -251,10 +266,11 @@ class StopCheck:
         """Look at where the arm comes to rest, and take note of how far inside its limits the command is."""
         limits, chain = self._limits, self._chain
         low_rad, high_rad = limits.q_min_rad, limits.q_max_rad
-        is_inside, self._fence_m, self._range_rad = _stayed_inside(
+        is_inside, *known = _stayed_inside(
             q, end, (low_rad, high_rad), limits.workspace_m, (limits.tip_min_m, chain.tip_m, chain.finger_m),
             chain.rows, (chain.tcp_m, chain.elbow_m), self._fence_rows,
         )  # fmt: skip
+        self.known[0] = known
         if is_inside:
             return None
         if not _range_room(end, low_rad, high_rad) >= 0.0:

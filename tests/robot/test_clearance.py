@@ -52,6 +52,24 @@ def test_the_least_gap_is_that_of_all_pairs_by_themselves(clearance, shapes):
     assert worst < 1e-4
 
 
+def test_what_each_pair_keeps_is_what_its_contacts_say_whichever_shape_is_first(clearance):
+    n_met = 0
+    for q in _postures(60):
+        clearance.gap(q)
+        contact = clearance._data.contact
+        for keep, (a, b) in zip(contact.includemargin.tolist(), contact.geom.tolist(), strict=True):
+            assert clearance._kept_of[a, b] == clearance._kept_of[b, a] == keep
+            n_met += 1
+    assert n_met > 60
+
+
+def test_joints_asked_about_are_the_models_own(clearance):
+    """They are written past the library's own door."""
+    for q in _postures(3):
+        clearance.gap(q)
+        assert clearance._data.qpos.tolist() == list(q)
+
+
 def test_a_capsule_s_distance_is_that_of_its_points_along_the_axis(clearance, shapes):
     """Independent of MuJoCo's distances: both axes of two capsules are sampled."""
     model, data, pairs = shapes

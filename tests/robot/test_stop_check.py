@@ -201,7 +201,7 @@ def test_after_seeding_everything_is_looked_at_afresh():
         assert check.check(_turned(1e-4 * k), _turned(1e-4 * (k - 1)), STATE) is None
     assert bodies.n_asked == 1
     check.seed()
-    assert check._fence_m == 0.0
+    assert check.known[0, 0] == 0.0
     assert check.check(_turned(4e-4), _turned(3e-4), STATE) is None
     assert bodies.n_asked == 2
 
@@ -209,4 +209,4 @@ def test_after_seeding_everything_is_looked_at_afresh():
 def test_the_arm_s_own_table_lets_a_working_posture_move():
     check = StopCheck(ARM, CLEARANCE, limits=LIMITS, tick_s=TICK_S, braking=BRAKING)
     assert check.check(_turned(0.005), START, STATE) is None
-    assert not math.isnan(check._fence_m)
+    assert not math.isnan(check.known[0, 0])
