@@ -115,6 +115,13 @@ def test_unattended_leaves_the_shipped_arm_as_it_is_and_attended_slows_its_tool(
     assert max(slowed.speed_m_s, slowed.guarded_speed_m_s, slowed.max_step_m / slowed.step_s) < 0.25
 
 
+@pytest.mark.parametrize(("steady_n", "guarded_m_s"), [(250.0, 0.25), (300.0, 0.25), (249.0, 0.249), (60.0, 0.06)])
+def test_low_over_the_table_a_tool_meets_nothing_faster_than_the_lasting_force_bears(steady_n, guarded_m_s):
+    profile = load_limits(NAME).profile("unattended")
+    held = limited(ARM, replace(profile, contact_force=replace(profile.contact_force, steady_n=steady_n)))
+    assert held.motion.guarded_speed_m_s == pytest.approx(guarded_m_s)
+
+
 def test_of_two_limits_the_smaller_is_held(tmp_path):
     def change(tree):
         put(*UNATTENDED, "joints", 0, "speed_rad_s", to=0.5)(tree)
