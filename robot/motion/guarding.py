@@ -28,7 +28,7 @@ def is_guarded(at_m: Vec3, to_m: Vec3, guard_z_m: float) -> bool:
 
 
 def guarded_share(at_m: Vec3, to_m: Vec3, speed_m_s: float, guarded_m_s: float) -> float:
-    """Return the share of the axes' greatest speed at which a tool that goes straight sinks and slides as guarded.
+    """Return the share of the axes' greatest speed at which a tool sinks and slides as guarded, the two together.
 
     Its axes arrive together: along the line the longest of them goes at the greatest speed.
 
@@ -36,11 +36,11 @@ def guarded_share(at_m: Vec3, to_m: Vec3, speed_m_s: float, guarded_m_s: float) 
         at_m: where it is.
         to_m: where it goes.
         speed_m_s: the axes' greatest speed.
-        guarded_m_s: how fast it may sink, and slide.
+        guarded_m_s: how fast it may sink and slide.
     """
     dx, dy, dz = to_m[0] - at_m[0], to_m[1] - at_m[1], to_m[2] - at_m[2]
     longest = max(abs(dx), abs(dy), abs(dz))
-    fastest = speed_m_s * max(math.hypot(dx, dy), -dz) / longest if longest > 0.0 else 0.0
+    fastest = speed_m_s * math.hypot(dx, dy, min(0.0, dz)) / longest if longest > 0.0 else 0.0
     return min(1.0, guarded_m_s / fastest) if fastest > 0.0 else 1.0
 
 

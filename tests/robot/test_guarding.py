@@ -26,7 +26,7 @@ def test_a_straight_way_sinks_and_slides_as_guarded_and_no_slower_than_it_must(a
     longest = max(map(abs, way))
     assume(longest > 1e-6)
     share = guarded_share(at, to, speed, guarded)
-    fastest = share * speed * max(math.hypot(way[0], way[1]), -way[2]) / longest
+    fastest = share * speed * math.hypot(way[0], way[1], min(0.0, way[2])) / longest
     assert fastest <= guarded * (1.0 + 1e-9)
     assert share == 1.0 or fastest >= guarded * (1.0 - 1e-9)
 
