@@ -12,9 +12,6 @@ FENCE_MARGIN_M = 1e-3
 """Motion keeps this far inside of a fence, so that the gate never meets one by rounding."""
 SPEED_SHARE = 0.98
 """Share of a profile's greatest speeds of the tool that motion uses."""
-PUSH_N_S_M = 1000.0
-"""What presses on a tool that slides into what stands on the table, for each m/s at which it met that: on the twin 580
-at most, fingers empty or full, on rings, boxes and lids, on a plant that lags twice as much too."""
 HARD_SHARE = 0.4
 """Of the lasting force, so much is the most that a push may be to be given way to no faster than joints may brake."""
 
@@ -53,7 +50,7 @@ def _motion(motion: MotionLimits, profile: Profile) -> MotionLimits:
     return msgspec.structs.replace(
         motion,
         speed_m_s=min(motion.speed_m_s, speed),
-        guarded_speed_m_s=min(motion.guarded_speed_m_s, speed, force.steady_n / PUSH_N_S_M),
+        guarded_speed_m_s=min(motion.guarded_speed_m_s, speed),
         max_step_m=min(motion.max_step_m, speed * motion.step_s),
         workspace_m=_fenced(motion.workspace_m, profile),
         # Fingers may touch things, not the table. Motion itself stays a margin higher than this.

@@ -5,7 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from config.limited import PUSH_N_S_M, limited
+from config.limit_checks import PUSH_N_S_M
+from config.limited import limited
 from config.loader import resolve
 from robot.messages import Grip, Twist
 from robot.teleop import Send
