@@ -14,6 +14,9 @@ from config.yaml_text import join
 __all__ = ["check_limits", "check_limits_fit", "check_profile_named"]
 
 ROUNDING_M = 1e-9
+PUSH_N_S_M = 1000.0
+"""What presses on a tool that slides into what stands on the table, for each m/s at which it met that: on the twin 580
+at most, fingers empty or full, on rings, boxes and lids, on a plant that lags twice as much too."""
 TAKEN = "reduced"
 """A name of UR's own, for a mode of the controller's safety system."""
 
@@ -51,6 +54,7 @@ def check_limits_fit(limits: LimitsFile, arm: ArmConfig, scenario: Scenario, fil
         _check_grip(profile, arm, where, checker)
         _check_stopping(profile, arm, where, checker)
         _check_contacts(profile, arm, where, checker)
+        _check_guarded(profile, arm, where, checker)
 
 
 def _check_home(profile: Profile, arm: ArmConfig, where: str, checker: Checker) -> None:
@@ -135,6 +139,15 @@ def _check_contacts(profile: Profile, arm: ArmConfig, where: str, checker: Check
         hard, fast = f"at least {blow_n:g}, the newtons of a blow", f"at least {speed:g}, the tool's m/s"
         checker.need(pair.force_n >= blow_n, f"{at}.force_n", f"{hard} {what}", f"{pair.force_n:g}")
         checker.need(pair.speed_m_s >= speed, f"{at}.speed_m_s", f"{fast} {what}", f"{pair.speed_m_s:g}")
+
+
+def _check_guarded(profile: Profile, arm: ArmConfig, where: str, checker: Checker) -> None:
+    """Check that what a tool meets low over the table, at guarded speed, presses on it no harder than may last."""
+    met_m_s = min(arm.motion.guarded_speed_m_s, profile.speeds.tcp_m_s)
+    what = f"what may press on a tool that meets things at {met_m_s:g} m/s, or a slower motion.guarded_speed_m_s"
+    steady_n, needed = profile.contact_force.steady_n, PUSH_N_S_M * met_m_s
+    at = f"{where}.contact_force.steady_n"
+    checker.need(steady_n >= needed * (1.0 - 1e-9), at, f"at least {needed:g}, {what}", f"{steady_n:g}")
 
 
 def gap_m(fence: Fence | Plane | KeepOut, point_m: Point) -> float:

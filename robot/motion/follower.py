@@ -12,7 +12,7 @@ from robot.motion.ahead import Ahead
 from robot.motion.chords import share_of_speed
 from robot.motion.commands import Commands
 from robot.motion.free import free_bounds
-from robot.motion.guarding import guarded_share, is_guarded
+from robot.motion.guarding import guarded_share, is_guarded, share_of_line
 from robot.motion.holding import Place, slid
 from robot.motion.lean import Lean
 from robot.motion.limiter import AxisLimits, Limiter
@@ -52,6 +52,7 @@ class Follower:
         yaw_rad: Turn at which it will rest.
         trouble: What went wrong in the last tick, if anything: the joints brake.
         held: What held the last tick back and by which share of its step, if anything did.
+        most_m_s: How fast the tool may go towards new targets, for what holds it.
     """
 
     def __init__(
@@ -83,7 +84,7 @@ class Follower:
         self._lean = Lean(tick_s=tick_s)
         self._home_yaw_rad = arm.tool_yaw_rad
         self._guard_z_m, self._guarded_m_s, self._speed_m_s = guard_z_m, motion.guarded_speed_m_s, motion.speed_m_s
-        self._tick_s = tick_s
+        self.most_m_s, self._tick_s = math.inf, tick_s
         self._tool = Limiter(
             AxisLimits(
                 speed=(*(motion.speed_m_s,) * 3, TURN_RAD_S),
@@ -169,10 +170,10 @@ class Follower:
 
     def _greatest_steps(self, to_m: Vec3) -> Vec3:
         """Return how far parts may go in a tick on the way to a place: low over the table the tool as guarded."""
-        tcp_m, flange_m, elbow_m = self._envelope.part_step_m
+        (tcp_m, flange_m, elbow_m), most_m = self._envelope.part_step_m, self.most_m_s * self._tick_s
         if is_guarded(self._commands.tcp_m, to_m, self._guard_z_m):
             tcp_m = min(tcp_m, self._guarded_m_s * self._tick_s)
-        return tcp_m, flange_m, elbow_m
+        return min(tcp_m, most_m), min(flange_m, most_m), elbow_m
 
     def joints_at(self, place_m: Vec3, yaw_rad: float | None = None, seed_rad: Vec6 | None = None) -> Vec6 | None:
         """Return joints near the present ones that bring the tool to a place; None where none do, or it is tilted.
@@ -270,7 +271,8 @@ class Follower:
         x, y, z, _ = self._tool.at
         at_m, to_m = (x, y, z), (target[0], target[1], target[2])
         is_slow = is_guarded(at_m, to_m, self._guard_z_m)
-        self._tool.slow_to(guarded_share(at_m, to_m, self._speed_m_s, self._guarded_m_s) if is_slow else 1.0)
+        slow = guarded_share(at_m, to_m, self._speed_m_s, self._guarded_m_s) if is_slow else 1.0
+        self._tool.slow_to(min(slow, share_of_line(at_m, to_m, self._speed_m_s, self.most_m_s)))
         self._tool.aim(target)
 
     def _take_target(self, target: list[float]) -> None:

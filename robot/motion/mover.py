@@ -10,6 +10,7 @@ from robot.messages import ArmState, Heading, Intent, JointTarget, Limited, Twis
 from robot.motion.approach import N_PIECES, Approach
 from robot.motion.contact import ContactGuard
 from robot.motion.follower import SWIFT_TICK_S, Follower
+from robot.motion.guarding import dragged_speed
 from robot.motion.holding import MARGIN_M, MARGIN_RAD, led_out, share_of_giving_way, share_of_way_back
 from robot.motion.pieces import Pieces, padded, whole
 from robot.motion.target import (
@@ -71,6 +72,7 @@ class Mover:
         )
         self._envelope = envelope
         self._contact, self._hard_n = ContactGuard(arm), arm.motion.hard_force_n
+        self._contact_n, self._most_m_s = arm.motion.contact_force_n, envelope.part_step_m[0] / envelope.tick_s
         is_swift = tick_s < SWIFT_TICK_S
         self._trail = Trail(
             arm.servo, tick_s=tick_s, q_rad=self._follower.q_rad, n_ahead=N_PIECES + 1 if is_swift else 0
@@ -135,6 +137,7 @@ class Mover:
         self._find_out()
         self._amounts = {}
         self._follower.let_go()
+        self._follower.most_m_s = dragged_speed(state.tcp_force_n, self._contact_n, self._most_m_s)
         at, yaw = self._follower.target_m, self._follower.yaw_rad
         if isinstance(intent, Heading):
             self._follow(advance_heading(at, intent, self._limits, duration_s), yaw, state)

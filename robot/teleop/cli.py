@@ -83,7 +83,10 @@ def check(
     stream: Annotated[int | None, typer.Option(min=0, help="One stream alone, by its number.")] = None,
     seed: Annotated[int, typer.Option(min=0, help="Of all that is drawn.")] = 0,
     json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
-    out: Annotated[Path | None, typer.Option(help="Folder for report and figure.")] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(help="Folder for report, figure and what has been run: the same command goes on there."),
+    ] = None,
     commands: Annotated[int | None, typer.Option(min=1, max=2000, help="Commands a stream.")] = None,
     blocks: Annotated[int | None, typer.Option(min=1, help="So many blocks of streams only.")] = None,
     workers: Annotated[int | None, typer.Option(min=1, max=64, help="Processes.")] = None,
@@ -104,9 +107,8 @@ def check(
         with redirected_stdout(STDERR):
             answer: Answer = checker(resolved, wanted)
     except KeyboardInterrupt:
-        typer.echo(
-            "interrupted: nothing was decided, nothing is held any more; the same command begins again", err=True
-        )
+        then = "begins again" if out is None or mutate else "goes on where this one was"
+        typer.echo(f"interrupted: nothing was decided, nothing is held any more; the same command {then}", err=True)
         raise typer.Exit(1) from None
     if json:
         typer.echo(answer.json)

@@ -15,7 +15,7 @@ class Wanted(msgspec.Struct, frozen=True, kw_only=True):
     full: bool = False
     json: bool = False
     out: Path | None = None
-    """Folder for the report and the figure."""
+    """Folder for the report, the figure and the streams that were run: the same command goes on there."""
     stream: int | None = None
     """One stream alone, by its number."""
     mutate: bool = False

@@ -55,9 +55,15 @@ class Block(msgspec.Struct, frozen=True, kw_only=True):
     """The limit that a search goes for; empty for whichever is nearest."""
 
     @property
+    def streams(self) -> tuple[int, ...]:
+        """Their numbers, a search's too."""
+        search = self.search
+        return self.numbers if search is None else tuple(range(search.first, search.first + search.n_streams))
+
+    @property
     def n_streams(self) -> int:
         """How many."""
-        return len(self.numbers) if self.search is None else self.search.n_streams
+        return len(self.streams)
 
 
 def part_of(setup: Setup, *, full: bool) -> tuple[Block, ...]:

@@ -14,6 +14,7 @@ from robot.bench import BenchResult, bench_report
 from robot.teleop.wanted import Answer, Wanted
 from sim_twin.as_seen import Beginning
 from sim_twin.checking.check import N_COMMANDS, Setup, check_streams, part_of, rerun
+from sim_twin.checking.kept import KeptStreams
 from sim_twin.checking.mutations import try_mutation
 from sim_twin.checking.report import CheckReport, MutationReport, as_json, draw, shown, shown_mutations
 from sim_twin.checking.ring import StreamResult
@@ -63,18 +64,26 @@ def _many(setup: Setup, wanted: Wanted, look: Callable[[], object]) -> Tally:
     blocks = part_of(setup, full=wanted.full)
     if wanted.n_blocks:
         blocks = blocks[: wanted.n_blocks]
-    tally = Tally()
+    tally, kept = Tally(), KeptStreams(wanted.out, setup)
     n_workers = wanted.n_workers or len(os.sched_getaffinity(0))
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
     with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
         task = progress.add_task("streams", total=sum(b.n_streams for b in blocks))
 
-        def heard(results: list[StreamResult]) -> None:
+        def told(results: list[StreamResult]) -> None:
             for came in results:
                 tally.add(came)
             progress.update(task, advance=len(results), description=f"streams, {tally.n_violations} violations")
 
-        check_streams(setup, blocks, n_workers=n_workers, heard=heard, look=look)
+        def heard(results: list[StreamResult]) -> None:
+            kept.add(results)
+            told(results)
+
+        before = [(block, kept.of(block)) for block in blocks]
+        for _, results in before:
+            told(results or [])
+        left = tuple(block for block, results in before if results is None)
+        check_streams(setup, left, n_workers=n_workers, heard=heard, look=look)
     return tally
 
 

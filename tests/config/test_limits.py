@@ -5,6 +5,7 @@ import yaml
 from msgspec.structs import replace
 
 from config.errors import ConfigError
+from config.limit_checks import PUSH_N_S_M
 from config.limited import FENCE_MARGIN_M, limited
 from config.loader import load_arm, load_limits, load_resolved, resolve, with_rig
 from config.resolved import dump_resolved
@@ -113,6 +114,15 @@ def test_unattended_leaves_the_shipped_arm_as_it_is_and_attended_slows_its_tool(
     assert left.motion.table_clearance_m == pytest.approx(held.clearances.scene_m - FENCE_MARGIN_M)
     slowed = limited(ARM, limits.profile("attended")).motion
     assert max(slowed.speed_m_s, slowed.guarded_speed_m_s, slowed.max_step_m / slowed.step_s) < 0.25
+
+
+def test_a_lasting_force_that_bears_a_tool_at_guarded_speed_passes_and_a_little_less_is_refused(tmp_path):
+    bears_n = PUSH_N_S_M * ARM.motion.guarded_speed_m_s
+    resolve(rig=rig_with(tmp_path, put(*UNATTENDED, "contact_force", "steady_n", to=bears_n)))
+    with pytest.raises(
+        ConfigError, match=r"profiles\[1\].contact_force.steady_n: expected at least 250, what may press"
+    ):
+        resolve(rig=rig_with(tmp_path, put(*UNATTENDED, "contact_force", "steady_n", to=bears_n * (1.0 - 1e-6))))
 
 
 def test_of_two_limits_the_smaller_is_held(tmp_path):

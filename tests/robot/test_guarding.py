@@ -11,7 +11,7 @@ from config.limited import limited
 from config.loader import resolve
 from robot.envelope import Envelope
 from robot.motion.follower import Follower
-from robot.motion.guarding import guarded_share, is_guarded
+from robot.motion.guarding import LEAST_SHARE, SNAP_M_S_N, dragged_speed, guarded_share, is_guarded, share_of_line
 
 RESOLVED = resolve()
 PROFILE = RESOLVED.limits.profile("unattended")
@@ -26,7 +26,7 @@ def test_a_straight_way_sinks_and_slides_as_guarded_and_no_slower_than_it_must(a
     longest = max(map(abs, way))
     assume(longest > 1e-6)
     share = guarded_share(at, to, speed, guarded)
-    fastest = share * speed * max(math.hypot(way[0], way[1]), -way[2]) / longest
+    fastest = share * speed * math.hypot(way[0], way[1], min(0.0, way[2])) / longest
     assert fastest <= guarded * (1.0 + 1e-9)
     assert share == 1.0 or fastest >= guarded * (1.0 - 1e-9)
 
@@ -44,6 +44,39 @@ def test_a_straight_way_sinks_and_slides_as_guarded_and_no_slower_than_it_must(a
 )
 def test_a_way_is_guarded_where_it_is_low_and_does_not_just_rise(at, to, is_slow):
     assert is_guarded(at, to, GUARD_Z_M) is is_slow
+
+
+@given(at=places, to=places, speed=st.floats(0.1, 1.0), most=st.floats(0.01, 2.0))
+def test_a_straight_way_is_gone_as_fast_as_it_may_be_and_no_faster(at, to, speed, most):
+    longest = max(abs(b - a) for a, b in zip(at, to, strict=True))
+    assume(longest > 1e-6)
+    share = share_of_line(at, to, speed, most)
+    along = share * speed * math.dist(at, to) / longest
+    assert along <= most * (1.0 + 1e-9)
+    assert share == 1.0 or along >= most * (1.0 - 1e-9)
+
+
+@given(force=st.tuples(*[st.floats(-500.0, 500.0)] * 3), most=st.floats(0.05, 1.0))
+def test_what_holds_a_tool_slows_it_by_what_it_would_snap_away_with_and_never_to_a_stand(force, most):
+    speed, held_n = dragged_speed(force, 15.0, most), math.hypot(*force) - 15.0
+    assert LEAST_SHARE * most <= speed <= most
+    assert (speed == most) == (held_n <= 0.0) or held_n * SNAP_M_S_N < 1e-12
+    assert speed == LEAST_SHARE * most or speed + SNAP_M_S_N * max(0.0, held_n) == pytest.approx(most)
+
+
+@pytest.mark.parametrize(
+    ("force_n", "speed_m_s"),
+    [
+        ((15.0, 0.0, 0.0), 0.25),
+        ((0.0, -15.0, 0.0), 0.25),
+        ((0.0, 0.0, math.nextafter(15.0, 16.0) + 1e-6), 0.25 - SNAP_M_S_N * 1e-6),
+        ((0.0, 43.0, -25.0), 0.25 - SNAP_M_S_N * (math.hypot(43.0, 25.0) - 15.0)),
+        ((0.0, 0.0, 90.0), 0.025),
+        ((0.0, 0.0, -1e4), 0.025),
+    ],
+)
+def test_how_fast_a_held_tool_may_go(force_n, speed_m_s):
+    assert dragged_speed(force_n, 15.0, 0.25) == pytest.approx(speed_m_s, abs=1e-12)
 
 
 def made(tick_s):

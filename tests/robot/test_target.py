@@ -58,8 +58,18 @@ def test_no_twist_moves_the_target_by_more_than_the_longest_step(at, velocity):
 def test_below_the_guard_height_the_target_sinks_and_slides_at_guarded_speed(at, angle, distance, height):
     x, y, z = advance_heading(at, heading(angle, distance, height), LIMITS, DT).position_m
     if z < LIMITS.guard_z_m - 1e-9:
-        assert math.hypot(x - at[0], y - at[1]) <= SLOW + 1e-9
-        assert z >= min(at[2], LIMITS.guard_z_m) - SLOW - 1e-9
+        sunk = max(0.0, min(at[2], LIMITS.guard_z_m) - z)
+        assert math.hypot(x - at[0], y - at[1], sunk) <= SLOW + 1e-9
+
+
+@pytest.mark.parametrize(("height", "share"), [(0.08, 1.0), (0.0, 1.0 / math.sqrt(2.0)), (TRAVEL, 1.0)])
+def test_a_target_that_slides_as_it_sinks_does_both_the_slower_and_none_where_it_rises(height, share):
+    rise = min(STEP, max(-STEP, height - DEEP[2])) if height else -STEP
+    shaped = advance_twist(DEEP, Twist(linear_m_s=(STEP / DT, 0.0, rise / DT)), LIMITS, DT)
+    x, _, z = shaped.position_m
+    assert shaped.limiters[-1] == "guard"
+    assert x - DEEP[0] == pytest.approx(SLOW * share)
+    assert (z - DEEP[2] > 0.0) is (height == TRAVEL)
 
 
 def test_below_the_guard_height_the_target_rises_freely():

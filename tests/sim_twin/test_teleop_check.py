@@ -56,6 +56,9 @@ MENDED = (
     pytest.param("unattended", 588, FORCES, id="a cylinder met by a tool that caught up", marks=pytest.mark.slow),
     pytest.param("unattended", 2133, FORCES[1:], id="leaves met by a tool that caught up", marks=pytest.mark.slow),
     pytest.param("attended", 965, FORCES[1:], id="held against a fence by a cap", marks=pytest.mark.slow),
+    pytest.param("attended", 742, ("steady_force",), id="a finger that slid into a ring", marks=pytest.mark.slow),
+    pytest.param("unattended", 231, ("steady_force",), id="fingers aslant on a lid's edge", marks=pytest.mark.slow),
+    pytest.param("attended", 2357, SWUNG, id="a finger that came off a rim", marks=pytest.mark.slow),
     pytest.param("attended", 2908, SWUNG, id="turned round, nominal", marks=pytest.mark.slow),
     pytest.param("attended", 2986, SWUNG, id="turned round, loaded", marks=pytest.mark.slow),
 )
