@@ -33,6 +33,7 @@ class CameraPerception:
 
     Attributes:
         eye: The camera as it was calibrated.
+        shown_ns: When the newest picture that shows the table was exposed, forgotten or not; None before one.
     """
 
     def __init__(self, *, scenario: Scenario, arm: ArmConfig, rig: Rig) -> None:
@@ -61,6 +62,7 @@ class CameraPerception:
         self._newest_ns: int | None = None
         self._lit_ns: int | None = None
         """When the newest picture that shows the table was exposed."""
+        self.shown_ns: int | None = None
 
     @property
     def camera_spec(self) -> CameraSpec:
@@ -134,7 +136,7 @@ class CameraPerception:
         self._frames.note(frame)
         self._newest_ns = frame.stamp_ns
         if seen.is_lit and not self._frames.is_frozen:
-            self._lit_ns = frame.stamp_ns
+            self._lit_ns = self.shown_ns = frame.stamp_ns
 
     def _what_is_wrong(self, now_ns: int) -> str:
         """Return in words why no picture shows the table."""

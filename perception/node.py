@@ -18,9 +18,9 @@ from config.scenario import Scenario
 from perception.cameras.over_bus import BusCamera
 from perception.ground_truth import TABLE
 from robot.bus import TRUTH, Bus, Received, Role
-from robot.bus.camera_rows import Forgotten
+from robot.bus.camera_rows import Forgotten, Light
 from robot.bus.errors import BusError
-from robot.bus.topics import ARM_STATE, FORGET, PERCEPT
+from robot.bus.topics import ARM_STATE, FORGET, LIGHT, PERCEPT
 from robot.errors import RobotConfigError, RobotError
 from robot.frames import CameraSpec
 from robot.messages import ArmState, Percept, SceneState
@@ -30,7 +30,7 @@ from robot.station_doors import Perceives, Sighted
 
 __all__ = ["PerceptionNode", "aged", "run_perception"]
 
-LOOK_S, PERIOD_NS = 0.01, 20_000_000
+LOOK_S, PERIOD_NS, LIGHT_NS = 0.01, 20_000_000, 500_000_000
 ARM_NS = 500_000_000
 """An idle arm is measured ten times a second: older, and nothing is known of where the tool is."""
 
@@ -38,6 +38,9 @@ ARM_NS = 500_000_000
 @runtime_checkable
 class Calibrated(Sighted, Protocol):
     """A perception that knows which camera it looks through before it has one."""
+
+    shown_ns: int | None
+    """When the newest picture that shows the table was exposed; None before one."""
 
     @property
     def camera_spec(self) -> CameraSpec:
@@ -74,6 +77,8 @@ class PerceptionNode:
         self._is_asked = False
         self._told_ns = 0
         self._says, self._forgets = bus.publisher(PERCEPT), bus.answerer(FORGET)
+        self._lights = None if camera is None else bus.publisher(LIGHT)
+        self._begun_ns = self._light_ns = now_ns()
         self._arms = bus.subscriber(ARM_STATE, self._take_arm)
         self._scenes = bus.subscriber(TRUTH, self._take_scene) if camera is None else None
 
@@ -90,6 +95,7 @@ class PerceptionNode:
     def turn(self) -> None:
         """Perceive, where a measurement has come or it is time."""
         self._forget()
+        self._tell_light()
         is_asked, self._is_asked = self._is_asked, False
         now_ns = self._now_ns()
         if not is_asked and now_ns - self._told_ns < PERIOD_NS:
@@ -133,6 +139,19 @@ class PerceptionNode:
             return "perceives"
         counts = self._camera.counts
         return f"perceives: {counts.read} frames, {counts.lost} lost, {counts.torn} torn, {counts.late} late"
+
+    def _tell_light(self) -> None:
+        """Tell twice a second for how long no picture has shown the table, where there are pictures."""
+        now_ns, seen = self._now_ns(), self._perception
+        if self._lights is None or self._camera is None or now_ns - self._light_ns < LIGHT_NS:
+            return
+        self._light_ns = now_ns
+        shown_ns = seen.shown_ns if isinstance(seen, Calibrated) else None
+        dark_ns = max(0, now_ns - (self._begun_ns if shown_ns is None else shown_ns))
+        try:
+            self._lights.put(Light(camera=self._camera.spec.name, dark_s=dark_ns / 1e9))
+        except BusError as error:
+            self.pulse.fail(str(error))
 
     def _forget(self) -> None:
         """Begin anew, where the table was laid out: nothing of it before counts from the answer on."""

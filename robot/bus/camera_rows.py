@@ -5,7 +5,7 @@ from typing import Annotated
 import msgspec
 from msgspec import Meta
 
-__all__ = ["MEMORY_NAME", "Forget", "Forgotten", "FrameNote", "TwinPose"]
+__all__ = ["MEMORY_NAME", "Forget", "Forgotten", "FrameNote", "Light", "TwinPose"]
 
 MEMORY_NAME = r"^autotelic-[A-Za-z0-9_.-]{1,100}\Z"
 """Names of shared memory that a reader opens: no path leads out of where memory is shared."""
@@ -30,6 +30,14 @@ class FrameNote(msgspec.Struct, frozen=True, kw_only=True):
     """Where it lies; another one after the camera's process was started anew."""
     number: Annotated[int, Meta(ge=1)]
     """Which of those that were ever written there; its place is used again some frames later."""
+
+
+class Light(msgspec.Struct, frozen=True, kw_only=True):
+    """Whether a camera's pictures show the table in a light that it can be seen by."""
+
+    camera: str
+    dark_s: Annotated[float, Meta(ge=0.0)]
+    """How long there was no such picture."""
 
 
 class TwinPose(msgspec.Struct, frozen=True, kw_only=True):

@@ -9,15 +9,15 @@ from typing import Any
 import msgspec
 
 from robot.bus.account_rows import AccountPart, AccountWritten
-from robot.bus.camera_rows import Forget, Forgotten, FrameNote, TwinPose
+from robot.bus.camera_rows import Forget, Forgotten, FrameNote, Light, TwinPose
 from robot.bus.station_rows import Beat, Command, Health, StationAsk, StationReport, StationTold, StepDone, StopAsk
 from robot.bus.topic import Keep, Priority, Query, Role, Topic
 from robot.messages import ArmCommand, ArmState, Percept, SceneState, Verdict
 
 __all__ = [
-    "ACCOUNT", "ARM_STATE", "ASK", "BEAT", "CAMERA_FRAME", "CELL", "FORGET", "HEALTH", "INTENT", "LAY_OUT", "PERCEPT",
-    "PING", "QUERIES", "REPORT", "REQUESTED", "RESET", "SENT", "STEP", "STOP", "TOPICS", "TRUTH", "TWIN_POSE",
-    "VERDICT", "WRITTEN", "CellAction", "CellTruth", "Ping", "Pong", "ResetDone", "ResetRequest",
+    "ACCOUNT", "ARM_STATE", "ASK", "BEAT", "CAMERA_FRAME", "CELL", "FORGET", "HEALTH", "INTENT", "LAY_OUT", "LIGHT",
+    "PERCEPT", "PING", "QUERIES", "REPORT", "REQUESTED", "RESET", "SENT", "STEP", "STOP", "TOPICS", "TRUTH",
+    "TWIN_POSE", "VERDICT", "WRITTEN", "CellAction", "CellTruth", "Ping", "Pong", "ResetDone", "ResetRequest",
 ]  # fmt: skip
 
 
@@ -97,6 +97,7 @@ CAMERA_FRAME = Topic(
     priority=Priority.DATA_HIGH, is_recorded=False,
 )  # fmt: skip
 """One key for all cameras, told apart by the source and the note. The pictures themselves lie in shared memory."""
+LIGHT = Topic(name="camera/light", kind=Light, writers=(Role.PERCEPTION,), rate_hz=2.0)
 PERCEPT = Topic(
     name="percept", kind=Percept, writers=(Role.PERCEPTION, Role.ROBOT), rate_hz=50.0, deadline_s=0.15,
     priority=Priority.INTERACTIVE_HIGH,
@@ -157,7 +158,7 @@ PING = Query(name="bus/ping", request=Ping, reply=Pong, answered_by=tuple(Role),
 """Answered by every process on the bus."""
 
 TOPICS: tuple[Topic[Any], ...] = (
-    ARM_STATE, REQUESTED, SENT, VERDICT, TRUTH, TWIN_POSE, CAMERA_FRAME, PERCEPT, INTENT, STEP, BEAT, STOP, REPORT,
-    HEALTH, ACCOUNT, WRITTEN,
+    ARM_STATE, REQUESTED, SENT, VERDICT, TRUTH, TWIN_POSE, CAMERA_FRAME, LIGHT, PERCEPT, INTENT, STEP, BEAT, STOP,
+    REPORT, HEALTH, ACCOUNT, WRITTEN,
 )  # fmt: skip
 QUERIES: tuple[Query[Any, Any], ...] = (RESET, CELL, FORGET, ASK, LAY_OUT, PING)

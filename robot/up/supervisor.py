@@ -17,7 +17,7 @@ from robot.up.child import Child
 from robot.up.clocks import ClockAsker, ClockBook
 from robot.up.logs import Logs
 from robot.up.night_watch import NightWatch
-from robot.up.plan import Backoff, NodePlan
+from robot.up.plan import Backoff, NodePlan, is_own_end
 from robot.up.summary import Event, NodeSummary, Summary, Worst
 from robot.up.watch import GONE_S, SILENT_S, HealthBook
 
@@ -28,8 +28,8 @@ START_S = 60.0
 STOP_S, NOW_S = 5.0, 1.0
 JOB_S, END_S = 30.0, 10.0
 USAGE, INTERRUPTED = 2, 130
-SPARE = "other"
-"""Kind of a process that the arm can do without."""
+JOB, SPARE = "job", "other"
+"""Kinds of a process: what commands the arm, and what it can do without."""
 
 
 class _Node:
@@ -81,6 +81,8 @@ class Supervisor:
         self._worst = Worst.NOTHING
         self._first_s: float | None = None
         self._last_s: float | None = None
+        self._away_s: float | None = None
+        """When a process that the job needs ended or fell silent last."""
 
     def run(self, should_end: Callable[[], bool], *, look: Callable[[], object] = lambda: None) -> Summary:
         """Start everything, and watch it until the job is over, something is given up, or one is told to end.
@@ -188,6 +190,7 @@ class Supervisor:
         if not node.is_silent:
             node.is_silent = True
             is_needed = node.plan.kind != SPARE
+            self._note_away(node)
             self._note(node, f"silent for {SILENT_S:g} s{': the arm is stopped' if is_needed else ''}", Worst.MENDED)
             self._stop_arm(node)
         if self.book.is_silent(name, for_s=GONE_S, hub=self._hub):
@@ -202,15 +205,22 @@ class Supervisor:
             node.is_over = True
             self._note(node, "finished")
             return
+        is_own = is_own_end(node.plan.kind, self._now_s(), self._away_s)
+        self._note_away(node)
         how = f"killed by signal {-code}" if code is not None and code < 0 else f"ended with exit code {code}"
         self._stop_arm(node)
-        delay_s = None if code == USAGE else node.backoff.delay_s(self._now_s())
+        delay_s = None if code == USAGE else node.backoff.delay_s(self._now_s(), is_own=is_own)
         if delay_s is None:
             node.is_over = True
             self._note(node, f"{how} ({child.last_line}): it is given up", Worst.FAILED)
             return
         node.again_s = self._now_s() + delay_s
         self._note(node, f"{how} ({child.last_line}): it is started again in {delay_s:g} s", Worst.MENDED)
+
+    def _note_away(self, node: _Node) -> None:
+        """Note that a process is away, if it is one that the job needs."""
+        if node.plan.kind not in (JOB, SPARE):
+            self._away_s = self._now_s()
 
     def _stop_arm(self, node: _Node) -> None:
         """Say stop for a moment, unless the arm can do without that process: whoever holds it may be what ended."""

@@ -4,12 +4,13 @@ import pytest
 
 from perception.cameras.over_bus import FrameCounts
 from perception.ground_truth import GroundTruthPerception
-from perception.node import ARM_NS, PERIOD_NS, PerceptionNode, aged
+from perception.node import ARM_NS, LIGHT_NS, PERIOD_NS, PerceptionNode, aged
 from robot.bus import TRUTH
-from robot.bus.camera_rows import Forgotten
+from robot.bus.camera_rows import Forgotten, Light
 from robot.bus.envelope import Envelope, Origin
 from robot.bus.inlet import Received
-from robot.bus.topics import ARM_STATE, FORGET, PERCEPT
+from robot.bus.topics import ARM_STATE, FORGET, LIGHT, PERCEPT
+from robot.frames import CameraSpec
 from robot.messages import ObjectPose, SceneState
 from tests.support.stations import arm_state, fake_rig
 
@@ -25,6 +26,7 @@ class Air:
 
     def __init__(self):
         self.now_ns, self.said, self.take, self.asked = 10_000_000_000, [], {}, []
+        self.lights = []
         perception = GroundTruthPerception(scenario=RIG.scenario, arm=RIG.arm)
         self.node = PerceptionNode(self, perception, RIG.scenario, now_ns=lambda: self.now_ns)
 
@@ -33,7 +35,7 @@ class Air:
         return self
 
     def publisher(self, topic):
-        assert topic is PERCEPT
+        assert topic in (PERCEPT, LIGHT)
         return self
 
     def answerer(self, query):
@@ -43,8 +45,11 @@ class Air:
     def next(self):
         return self.asked.pop() if self.asked else None
 
-    def put(self, percept, *, stamp_ns):
-        self.said.append((percept, stamp_ns))
+    def put(self, message, *, stamp_ns=None):
+        if isinstance(message, Light):
+            self.lights.append(message)
+        else:
+            self.said.append((message, stamp_ns))
 
     def come(self, topic, message, *, ago_ns=0):
         at_ns = self.now_ns - ago_ns
@@ -134,6 +139,8 @@ class Seeing:
     """A perception by camera, and the camera in one: it tells what it was asked, and gives a percept."""
 
     counts = FrameCounts(read=7, lost=3, torn=1, late=2)
+    spec = camera_spec = CameraSpec(name="table", serial="", width_px=640, height_px=480, rate_hz=20.0)
+    shown_ns = None
 
     def __init__(self):
         self.asked, self.n_forgotten = [], 0
@@ -198,3 +205,21 @@ def test_a_table_that_was_laid_out_is_forgotten_by_perception_and_camera_before_
     truth.asked.append(also)
     truth.node.turn()
     assert also.replies == [Forgotten()]
+
+
+def test_twice_a_second_it_is_told_for_how_long_no_picture_showed_the_table():
+    air, seeing = looking()
+    air.now_ns += LIGHT_NS - 1
+    air.node.turn()
+    assert not air.lights
+    air.now_ns += 1
+    air.node.turn()
+    air.node.turn()
+    seeing.shown_ns = air.now_ns
+    air.now_ns += LIGHT_NS
+    air.node.turn()
+    seeing.shown_ns = air.now_ns - 40_000_000
+    air.now_ns += LIGHT_NS
+    air.node.turn()
+    assert [light.dark_s for light in air.lights] == [0.5, 0.5, 0.54]
+    assert {light.camera for light in air.lights} == {"table"}
