@@ -15,6 +15,7 @@ from robot.bus.topics import HEALTH
 from robot.node.stop_caller import StopCaller
 from robot.up.child import Child
 from robot.up.clocks import ClockAsker, ClockBook
+from robot.up.faults import RandomFaults
 from robot.up.logs import Logs
 from robot.up.night_watch import NightWatch
 from robot.up.plan import Backoff, NodePlan, is_own_end
@@ -45,6 +46,8 @@ class _Node:
         self.again_s: float | None = None
         """When it is started again."""
         self.is_silent = self.is_over = False
+        self.is_faulted = False
+        """Its next end was brought about on purpose."""
 
 
 class Supervisor:
@@ -57,13 +60,14 @@ class Supervisor:
         rig: its name.
         tell: told of every event.
         night: watches over a run that nobody attends; None where somebody does.
+        faults: brought about on purpose, once everything has started; None where there are none.
         now_s: the monotonic clock.
     """
 
     def __init__(
         self, plans: tuple[NodePlan, ...], *, make_bus: Callable[[], Bus], logs: Logs, rig: str,
         tell: Callable[[Event], object] = lambda _: None, night: NightWatch | None = None,
-        now_s: Callable[[], float] = monotonic,
+        faults: RandomFaults | None = None, now_s: Callable[[], float] = monotonic,
     ) -> None:  # fmt: skip
         self.nodes = {plan.name: _Node(plan) for plan in plans}
         self._make_bus, self._logs, self._rig, self._tell, self._now_s = make_bus, logs, rig, tell, now_s
@@ -72,7 +76,7 @@ class Supervisor:
         self._bus: Bus | None = None
         self._stops: StopCaller | None = None
         self.book = HealthBook(tuple(self.nodes), clock=clock_number(), now_s=now_s)
-        self._night = night
+        self._night, self._faults = night, faults
         self.why_over: str | None = None
         """Why a run that nobody attends ended by itself."""
         self.clocks = ClockBook()
@@ -94,6 +98,7 @@ class Supervisor:
         try:
             if self._start_all(should_end, look):
                 while not should_end() and not self._is_over() and not self._is_spent():
+                    self._bring_about()
                     self._look()
                     look()
                     sleep(LOOK_S)
@@ -121,7 +126,7 @@ class Supervisor:
     def _start(self, node: _Node) -> None:
         node.n_starts += 1
         node.begun_s = self._now_s()
-        node.again_s, node.is_silent = None, False
+        node.again_s, node.is_silent, node.is_faulted = None, False, False
         node.child = Child(node.plan, self._logs)
         self.book.begin(node.plan.name, node.child.pid)
         self._note(node, f"started as process {node.child.pid}")
@@ -147,6 +152,19 @@ class Supervisor:
         self._health = bus.subscriber(HEALTH, lambda received: self.book.take(received))
 
     # --------------------------------------------------------------------------------------------------------- watch
+
+    def _bring_about(self) -> None:
+        """Bring about what is due on purpose; a process that is away is left alone."""
+        for fault in () if self._faults is None else self._faults.due(self._now_s()):
+            node = self.nodes[fault.node]
+            if node.child is None or node.child.code is not None:
+                continue
+            if fault.is_begin:
+                node.is_faulted = True
+                self._note(node, f"on purpose: {fault.what}")
+            else:
+                node.is_faulted = False
+            node.child.send(fault.number)
 
     def _is_over(self) -> bool:
         return any(node.is_over for node in self.nodes.values())
@@ -205,7 +223,7 @@ class Supervisor:
             node.is_over = True
             self._note(node, "finished")
             return
-        is_own = is_own_end(node.plan.kind, self._now_s(), self._away_s)
+        is_own = not node.is_faulted and is_own_end(node.plan.kind, self._now_s(), self._away_s)
         self._note_away(node)
         how = f"killed by signal {-code}" if code is not None and code < 0 else f"ended with exit code {code}"
         self._stop_arm(node)
@@ -301,7 +319,7 @@ class Supervisor:
             nodes.append(
                 NodeSummary(
                     name=name, n_starts=node.n_starts, exit_code=node.code, most_late_ms=heard.most_late_ms,
-                    most_mb=heard.most_mb, grown_mb=heard.most_mb - heard.first_mb,
+                    most_mb=heard.most_mb, grown_mb=heard.most_mb - heard.first_mb, slope_mb_h=heard.slope.mb_h,
                     last_error="" if heard.health is None else heard.health.last_error,
                 )
             )  # fmt: skip
