@@ -1,16 +1,11 @@
 """What crosses the bus about pictures: where a camera's newest one lies, and how a simulated world stands."""
 
-from typing import Annotated
-
 import msgspec
-from msgspec import Meta
 
 __all__ = ["MEMORY_NAME", "Forget", "Forgotten", "FrameNote", "Light", "TwinPose"]
 
 MEMORY_NAME = r"^autotelic-[A-Za-z0-9_.-]{1,100}\Z"
 """Names of shared memory that a reader opens: no path leads out of where memory is shared."""
-Count = Annotated[int, Meta(ge=0)]
-Side = Annotated[int, Meta(ge=1, le=20_000)]
 
 
 class FrameNote(msgspec.Struct, frozen=True, kw_only=True):
@@ -18,17 +13,17 @@ class FrameNote(msgspec.Struct, frozen=True, kw_only=True):
 
     camera: str
     serial: str
-    sequence: Count
+    sequence: int
     """Counts what the camera took; a gap is a frame that was lost before it came here."""
     stamp_ns: int
     """Middle of the exposure, by the monotonic clock of the camera's machine."""
     arrival_ns: int
     """When it could be had, by the same."""
-    width_px: Side
-    height_px: Side
-    memory: Annotated[str, Meta(pattern=MEMORY_NAME)]
+    width_px: int
+    height_px: int
+    memory: str
     """Where it lies; another one after the camera's process was started anew."""
-    number: Annotated[int, Meta(ge=1)]
+    number: int
     """Which of those that were ever written there; its place is used again some frames later."""
 
 
@@ -36,7 +31,7 @@ class Light(msgspec.Struct, frozen=True, kw_only=True):
     """Whether a camera's pictures show the table in a light that it can be seen by."""
 
     camera: str
-    dark_s: Annotated[float, Meta(ge=0.0)]
+    dark_s: float
     """How long there was no such picture."""
 
 
