@@ -249,7 +249,8 @@ def _load_rig(source: Source) -> Rig:
     if rig.camera is None:
         return rig
     calibration, colours = (_from(folder, name) for name in (rig.camera.calibration, rig.camera.colours))
-    camera = msgspec.structs.replace(rig.camera, calibration=calibration, colours=colours)
+    device = _from(folder, rig.camera.device)
+    camera = msgspec.structs.replace(rig.camera, calibration=calibration, colours=colours, device=device)
     return msgspec.structs.replace(rig, camera=camera)
 
 

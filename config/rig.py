@@ -30,6 +30,14 @@ class RigCamera(Section, frozen=True, kw_only=True):
     """Its lens and place, as `autotelic calibrate` wrote them."""
     colours: Annotated[str, Meta(min_length=1, max_length=500)]
     """How the scenario's things look through it, as `autotelic perception learn` wrote it."""
+    source: ImportString | None = None
+    """What gives its frames, where it has a process of its own (`autotelic node camera`)."""
+    device: Annotated[str, Meta(max_length=500)] = ""
+    """Which one of these, in that source's words: `/dev/video0`, or a video file from the rig's file on."""
+    rate_hz: Annotated[float, Meta(ge=1.0, le=240.0)] = 20.0
+    """How many frames a second are asked of it."""
+    exposure: Annotated[float, Meta(ge=0.0, le=1e6)] | None = None
+    """What a driver's exposure is locked at, in that driver's own unit (100 µs on Linux); None: by itself."""
 
 
 class NodeStart(Section, frozen=True, kw_only=True):
@@ -37,9 +45,9 @@ class NodeStart(Section, frozen=True, kw_only=True):
 
     name: Annotated[str, Meta(pattern=r"^[a-z][a-z0-9_]{0,15}\Z")]
     """Its source on the bus."""
-    kind: Annotated[str, Meta(pattern=r"^(hub|robot|perception|job|other)\Z")] = "other"
-    """The bus's hub, what holds the arm, what perceives for that, what commands it and whose end is the end of all, or
-    what the arm can do without: that is started again, and the arm goes on meanwhile."""
+    kind: Annotated[str, Meta(pattern=r"^(hub|robot|perception|camera|job|other)\Z")] = "other"
+    """The bus's hub, what holds the arm, what perceives for that, what it looks through, what commands the arm and
+    whose end is the end of all, or what the arm can do without: that is started again while the arm goes on."""
     command: Annotated[tuple[str, ...], Meta(min_length=1)]
     """Words of an `autotelic` command; {rig}, {scenario}, {address}, {bus}, {keys}, {cell} and {out} are filled in."""
 

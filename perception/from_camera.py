@@ -13,7 +13,7 @@ from perception.detection.eye import Eye
 from perception.errors import CameraSilentError, PerceptionConfigError
 from perception.tracking import ArmCourse, TableTracks, Tracked
 from perception.tracking.frames import FrameWatch
-from robot.frames import Frame
+from robot.frames import CameraSpec, Frame
 from robot.hal.protocols import Camera
 from robot.messages import ArmState, ObjectPercept, Percept, SceneState
 
@@ -33,6 +33,7 @@ class CameraPerception:
 
     Attributes:
         eye: The camera as it was calibrated.
+        shown_ns: When the newest picture that shows the table was exposed, forgotten or not; None before one.
     """
 
     def __init__(self, *, scenario: Scenario, arm: ArmConfig, rig: Rig) -> None:
@@ -54,12 +55,23 @@ class CameraPerception:
         self._detector = Detector(camera=file, scenario=scenario, colours=load_colours(rig.camera.colours))
         self._tracks, self._course = TableTracks(scenario), ArmCourse()
         self._names = tuple(t.name for t in (*scenario.buttons, *scenario.boxes, *scenario.cylinders))
+        self._rate_hz = rig.camera.rate_hz
         self._camera: Camera | None = None
         self._frames = FrameWatch()
         self._began_ns: int | None = None
         self._newest_ns: int | None = None
         self._lit_ns: int | None = None
         """When the newest picture that shows the table was exposed."""
+        self.shown_ns: int | None = None
+
+    @property
+    def camera_spec(self) -> CameraSpec:
+        """Which camera it looks through, as that was calibrated."""
+        lens = self._file.lens
+        return CameraSpec(
+            name=self._file.name, serial=self._file.serial, width_px=lens.width_px, height_px=lens.height_px,
+            rate_hz=self._rate_hz,
+        )  # fmt: skip
 
     def watch(self, cameras: Mapping[str, Camera]) -> None:
         """Take the camera to look through, of a plant's.
@@ -124,7 +136,7 @@ class CameraPerception:
         self._frames.note(frame)
         self._newest_ns = frame.stamp_ns
         if seen.is_lit and not self._frames.is_frozen:
-            self._lit_ns = frame.stamp_ns
+            self._lit_ns = self.shown_ns = frame.stamp_ns
 
     def _what_is_wrong(self, now_ns: int) -> str:
         """Return in words why no picture shows the table."""

@@ -18,7 +18,7 @@ from robot.person import TerminalPerson
 from robot.person_reset import PersonLook, PersonResetter
 from robot.person_station import PersonResetStation
 from robot.servo_client import ServoClient
-from robot.station_doors import Perceives
+from robot.station_doors import Perceives, Sighted
 
 __all__ = ["LabWorld", "build_lab_station", "join_robot_node"]
 
@@ -61,6 +61,11 @@ def build_lab_station(
     rig, arm = resolved.rig, limited(resolved.arm, resolved.profile)
     if rig.bus is None:
         raise RobotConfigError(f"rig {rig.name}: expected the endpoint of its bus, came none")
+    if isinstance(perception, Sighted):
+        raise RobotConfigError(
+            f"rig {rig.name}: expected a robot node and a perception node on its bus, for its camera's pictures go "
+            "there and nowhere else: start them with `autotelic up`"
+        )
     if is_driven and rig.reset == "person":
         return _driven_station(resolved, perception)
     bus = Bus(

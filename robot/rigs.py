@@ -14,7 +14,7 @@ from config.resolved import Resolved
 from config.rig import Rig
 from config.scenario import Scenario
 from robot.errors import RobotConfigError
-from robot.hal.protocols import Plant
+from robot.hal.protocols import Camera, Plant
 from robot.local_station import LocalStation
 from robot.motion import AskedHand
 from robot.own_senses import OwnSenses
@@ -25,11 +25,13 @@ from robot.tick_tap import TickTap
 from robot.timed import time_world
 
 if TYPE_CHECKING:
+    from robot.bus import Bus
     from robot.node import RemoteStation
     from robot.teleop.preview import Shadow
     from robot.teleop.view import View
 
 __all__ = [
+    "build_camera",
     "build_operator",
     "build_perception",
     "build_plant",
@@ -190,6 +192,25 @@ def _require_perception(rig: Rig) -> str:
             "percepts nothing can be learnt on a real arm. Nothing was connected to, nothing moves"
         )
     return rig.perception
+
+
+def build_camera(resolved: Resolved, bus: "Bus") -> Camera:
+    """Return the camera that a process of its own owns on a rig, not yet connected.
+
+    Args:
+        resolved: the rig, and the table that is before its camera.
+        bus: open, for a camera of a world that another process holds.
+
+    Raises:
+        RobotConfigError: the rig names no camera, or none with a source.
+    """
+    rig = resolved.rig
+    if rig.camera is None or rig.camera.source is None:
+        raise RobotConfigError(
+            f"rig {rig.name}: expected `camera:` with a source that a process of its own can own, such as "
+            "perception.cameras.device:DeviceCamera, came none"
+        )
+    return _make(rig.camera.source, "camera", scenario=resolved.scenario, arm=resolved.arm, rig=rig, bus=bus)
 
 
 def build_operator(rig: Rig) -> Operator | None:

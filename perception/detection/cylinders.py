@@ -1,5 +1,7 @@
 """Loose cylinders: every patch of the right colour is tried as one that stands and as one that lies."""
 
+import math
+
 import msgspec
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +13,7 @@ from perception.detection.glance import Glance, mask_of
 from perception.detection.hiding import Hiders
 from perception.detection.patches import N_PIXELS, components
 from perception.detection.seen import Stance, ThingSeen
-from perception.detection.shapes import hull, lying_points, standing_points
+from perception.detection.shapes import hull, lying_points, stamp, standing_points
 from perception.detection.silhouette import Fit, fit_where_free
 from robot.messages import Vec3
 
@@ -31,6 +33,10 @@ N_PATCHES = 3
 REACH = 1.2
 """What was seen somewhere is looked for this many of its diagonals about it."""
 N_AXES = 6
+CORE = 0.4
+"""Half a side of the block in a cylinder's middle that is inside of it however it lies, in its smaller size."""
+LEAST_CORE_PX, FREE_CORE, GONE = 12, 0.95, 0.05
+"""What is seen of that block, at the least, and how much of its colour may be there where it is said to be gone."""
 
 
 class _Patch(msgspec.Struct, frozen=True, kw_only=True):
@@ -51,6 +57,8 @@ class CylinderFinder:
         self._cylinder, self._eye, self._bit, self._table_m = cylinder, eye, bit, table_m
         self._standing = standing_points(cylinder)
         reach = REACH * float(np.hypot(cylinder.diameter_m, cylinder.height_m))
+        half = CORE * min(cylinder.diameter_m, cylinder.height_m) / math.sqrt(2.0)
+        self._core = np.array([[i, j, k] for i in (-1, 1) for j in (-1, 1) for k in (-1, 1)]) * half
         self._about = np.array([[i, j, k] for i in (-1, 1) for j in (-1, 1) for k in (-1, 1)]) * reach
 
     @property
@@ -75,7 +83,9 @@ class CylinderFinder:
         origin = seen.origin + np.array([left, upper])
         things = [self._try(part, first, hiders) for part, first in self._patches(mask, origin)]
         told = [thing for thing in things if thing is not None]
-        return max(told, key=lambda thing: thing.confidence * thing.visible, default=self._unseen())
+        if told:
+            return max(told, key=lambda thing: thing.confidence * thing.visible)
+        return self._unseen(is_gone=near is not None and self._is_gone(near, mask, origin, hiders))
 
     def _patches(self, mask: NDArray[np.uint8], origin: Array) -> list[tuple[NDArray[np.uint8], Array]]:
         """Return the largest patches, each alone in a window of its own with the window's first pixel."""
@@ -162,7 +172,19 @@ class CylinderFinder:
             confidence=fit.overlap, visible=fit.visible,
         )  # fmt: skip
 
-    def _unseen(self) -> ThingSeen:
+    def _is_gone(self, near: Vec3, mask: NDArray[np.uint8], origin: Array, hiders: Hiders) -> bool:
+        """Tell whether one sees past the middle of a cylinder that was there, whichever way it stood."""
+        core = np.array(near) + self._core
+        inside = np.zeros(mask.shape, np.uint8)
+        stamp(inside, hull(self._eye.pixels(core)), origin, 1)
+        n_inside = int(inside.sum())
+        free = inside & hiders.before(core).free(origin, (mask.shape[0], mask.shape[1]))
+        n_free = int(free.sum())
+        n_like = int((free & mask).sum())
+        return n_inside >= LEAST_CORE_PX and n_free >= FREE_CORE * n_inside and n_like <= GONE * n_free
+
+    def _unseen(self, *, is_gone: bool) -> ThingSeen:
         return ThingSeen(
-            name=self._cylinder.name, position_m=None, stance=Stance.UNKNOWN, axis_rad=None, confidence=0.0, visible=0.0
-        )
+            name=self._cylinder.name, position_m=None, stance=Stance.UNKNOWN, axis_rad=None, confidence=0.0,
+            visible=0.0, is_gone=is_gone,
+        )  # fmt: skip

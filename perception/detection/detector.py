@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 
+import msgspec
 import numpy as np
 
 from config.scenario import Scenario
@@ -76,6 +77,9 @@ class Detector:
         hiders = Hiders(self._eye, [solid for box in boxes for solid in box.solids], before)
         buttons = [finder.find(seen, hiders) for finder in self._buttons]
         cylinders = [finder.find(seen, hiders, near.get(finder.name)) for finder in self._cylinders]
+        if not before or any(box.lid is not None and box.lid.state is LidState.UNKNOWN for box in boxes):
+            # The arm, or leaves on their way, may stand before anything: nothing is known to be gone.
+            cylinders = [msgspec.structs.replace(thing, is_gone=False) for thing in cylinders]
         return Detections(
             stamp_ns=frame.stamp_ns,
             things=(*(b.thing for b in buttons), *(b.thing for b in boxes), *cylinders),

@@ -45,6 +45,8 @@ class ThingSeen(Message, frozen=True, kw_only=True):
     """0 to 1: how much of what should be seen there is seen, and nothing else; 0 where the place is unknown."""
     visible: float
     """0 to 1: the share of its outline's inside that nothing known stands before."""
+    is_gone: bool = False
+    """Its place is not told, and where it was seen before one sees something else, with nothing before it."""
 
 
 class LampSeen(Message, frozen=True, kw_only=True):

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 import msgspec
 
 from config.scenario import Box, Cylinder, Scenario
-from perception.detection.seen import Detections, Stance
+from perception.detection.seen import Detections, Stance, ThingSeen
 from perception.tracking.held import HeldThing
 from perception.tracking.lamp import LampTrack
 from perception.tracking.place import Place, PlaceTrack, Steadiness
@@ -21,6 +21,8 @@ NEAR_M = 0.11
 MEMORY_NS = 2_000_000_000
 """So long a loose thing is believed to be where it was, with the tool near it."""
 LOST_NS, SEARCH_EVERY = 200_000_000, 4
+N_GONE = 5
+"""So many pictures running must show something else where a loose thing was, before it is taken for gone."""
 LAMP_MEMORY_NS = 250_000_000
 """A lamp that was not seen for longer may be in any state."""
 UPRIGHT: Quat = (1.0, 0.0, 0.0, 0.0)
@@ -63,6 +65,7 @@ class TableTracks:
         self._approached_ns: dict[str, int] = {}
         self._kept: dict[str, Vec3] = {}
         self._let_go_ns: dict[str, int] = {}
+        self._n_gone: dict[str, int] = {}
 
     def note_arm(self, arm: ArmState) -> None:
         """Take in what the arm measured: what its hand holds, and what its tool comes near to."""
@@ -82,8 +85,17 @@ class TableTracks:
         for thing in seen.things:
             if thing.name != self._held.name and seen.stamp_ns > self._let_go_ns.get(thing.name, -1):
                 self._places[thing.name].note(thing, seen.stamp_ns)
+                self._note_gone(thing, seen.stamp_ns)
         for lamp in seen.lamps:
             self._lamps[lamp.name].note(lamp, seen.stamp_ns)
+
+    def _note_gone(self, thing: ThingSeen, stamp_ns: int) -> None:
+        """Count pictures that show past a thing's place; after some running nobody knows where it is."""
+        place = self._places[thing.name].place
+        self._n_gone[thing.name] = self._n_gone.get(thing.name, 0) + 1 if thing.is_gone else 0
+        if place is not None and self._n_gone[thing.name] >= N_GONE:
+            self._kept[thing.name], self._let_go_ns[thing.name] = place.position_m, stamp_ns
+            self._places[thing.name].forget()
 
     def thing(self, name: str, arm: ArmState) -> Tracked:
         """Return what is believed of a thing at a measurement's time."""

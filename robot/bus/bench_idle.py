@@ -15,7 +15,7 @@ from robot.bus.errors import BusError
 __all__ = ["idle_rows"]
 
 RIG = "virtual_lab"
-START_S, SETTLE_S, LOOK_S = 120.0, 3.0, 10.0
+START_S, SETTLE_S, LOOK_S, END_S = 120.0, 3.0, 10.0, 90.0
 STARTED = re.compile(r"(\w+): started as process (\d+)")
 TICKS_PER_S = os.sysconf("SC_CLK_TCK")
 
@@ -40,12 +40,21 @@ def idle_rows() -> list[BenchResult]:
             seconds = time.monotonic() - begun_s
             shares = {name: (_busy_s(pid) - before[name]) / seconds for name, pid in pids.items()}
         finally:
-            process.send_signal(signal.SIGINT)
-            process.wait()
+            _end(process)
     return [
         BenchResult(name=f"idle_cpu_share_{name}", value=share, unit="1", details={"of": "one processor"})
         for name, share in shares.items()
     ]
+
+
+def _end(process: "subprocess.Popen[bytes]") -> None:
+    """End the rig as Ctrl-C does; what hangs is killed, and its nodes end with it."""
+    process.send_signal(signal.SIGINT)
+    try:
+        process.wait(END_S)
+    except subprocess.TimeoutExpired:
+        process.kill()
+        process.wait()
 
 
 def _started(process: "subprocess.Popen[bytes]", log: Path) -> dict[str, int]:

@@ -23,6 +23,7 @@ class Role(StrEnum):
 
     ROBOT = "robot"
     PERCEPTION = "perception"
+    CAMERA = "camera"
     LEARNING = "learning"
     TELEOP = "teleop"
     TWIN = "twin"

@@ -9,14 +9,15 @@ from typing import Any
 import msgspec
 
 from robot.bus.account_rows import AccountPart, AccountWritten
+from robot.bus.camera_rows import Forget, Forgotten, FrameNote, Light, TwinPose
 from robot.bus.station_rows import Beat, Command, Health, StationAsk, StationReport, StationTold, StepDone, StopAsk
 from robot.bus.topic import Keep, Priority, Query, Role, Topic
 from robot.messages import ArmCommand, ArmState, Percept, SceneState, Verdict
 
 __all__ = [
-    "ACCOUNT", "ARM_STATE", "ASK", "BEAT", "CELL", "HEALTH", "INTENT", "LAY_OUT", "PERCEPT", "PING", "QUERIES",
-    "REPORT", "REQUESTED", "RESET", "SENT", "STEP", "STOP", "TOPICS", "TRUTH", "VERDICT", "WRITTEN", "CellAction",
-    "CellTruth", "Ping", "Pong", "ResetDone", "ResetRequest",
+    "ACCOUNT", "ARM_STATE", "ASK", "BEAT", "CAMERA_FRAME", "CELL", "FORGET", "HEALTH", "INTENT", "LAY_OUT", "LIGHT",
+    "PERCEPT", "PING", "QUERIES", "REPORT", "REQUESTED", "RESET", "SENT", "STEP", "STOP", "TOPICS", "TRUTH",
+    "TWIN_POSE", "VERDICT", "WRITTEN", "CellAction", "CellTruth", "Ping", "Pong", "ResetDone", "ResetRequest",
 ]  # fmt: skip
 
 
@@ -86,6 +87,17 @@ VERDICT = Topic(
 TRUTH = Topic(
     name="twin/truth", kind=SceneState, writers=(Role.TWIN,), rate_hz=100.0, deadline_s=0.1, priority=Priority.DATA_HIGH
 )
+TWIN_POSE = Topic(
+    name="twin/pose", kind=TwinPose, writers=(Role.TWIN,), rate_hz=50.0, deadline_s=0.1, priority=Priority.DATA_HIGH,
+    is_recorded=False,
+)  # fmt: skip
+"""Simulation only: what a camera process draws."""
+CAMERA_FRAME = Topic(
+    name="camera/frame", kind=FrameNote, writers=(Role.CAMERA,), rate_hz=20.0, deadline_s=0.15,
+    priority=Priority.DATA_HIGH, is_recorded=False,
+)  # fmt: skip
+"""One key for all cameras, told apart by the source and the note. The pictures themselves lie in shared memory."""
+LIGHT = Topic(name="camera/light", kind=Light, writers=(Role.PERCEPTION,), rate_hz=2.0)
 PERCEPT = Topic(
     name="percept", kind=Percept, writers=(Role.PERCEPTION, Role.ROBOT), rate_hz=50.0, deadline_s=0.15,
     priority=Priority.INTERACTIVE_HIGH,
@@ -128,6 +140,10 @@ CELL = Query(
     asked_by=(Role.ROBOT,),
     answer_s=5.0,
 )
+FORGET = Query(
+    name="percept/forget", request=Forget, reply=Forgotten, answered_by=(Role.PERCEPTION,), asked_by=(Role.ROBOT,),
+    answer_s=1.0,
+)  # fmt: skip
 ASK = Query(
     name="station/ask", request=StationAsk, reply=StationTold, answered_by=(Role.ROBOT,), asked_by=COMMANDERS,
     answer_s=40.0,
@@ -142,6 +158,7 @@ PING = Query(name="bus/ping", request=Ping, reply=Pong, answered_by=tuple(Role),
 """Answered by every process on the bus."""
 
 TOPICS: tuple[Topic[Any], ...] = (
-    ARM_STATE, REQUESTED, SENT, VERDICT, TRUTH, PERCEPT, INTENT, STEP, BEAT, STOP, REPORT, HEALTH, ACCOUNT, WRITTEN,
+    ARM_STATE, REQUESTED, SENT, VERDICT, TRUTH, TWIN_POSE, CAMERA_FRAME, LIGHT, PERCEPT, INTENT, STEP, BEAT, STOP,
+    REPORT, HEALTH, ACCOUNT, WRITTEN,
 )  # fmt: skip
-QUERIES: tuple[Query[Any, Any], ...] = (RESET, CELL, ASK, LAY_OUT, PING)
+QUERIES: tuple[Query[Any, Any], ...] = (RESET, CELL, FORGET, ASK, LAY_OUT, PING)

@@ -11,7 +11,7 @@ from robot.stop_request import StopRequest
 
 __all__ = ["app"]
 
-PERCEIVER = "perception.node:run_perception"
+PERCEIVER, SHOWER = "perception.node:run_perception", "perception.camera_node:run_camera"
 """Which room perceives is not known here."""
 
 app = typer.Typer(no_args_is_help=True, help="One process of a rig, as `autotelic up` starts it.")
@@ -61,3 +61,14 @@ def perception(
     resolved = resolve(rig=rig, scenario=scenario)
     with StopRequest() as end:
         load(PERCEIVER)(resolved, end=end)
+
+
+@app.command()
+def camera(
+    rig: Annotated[str, typer.Option(help="A rig's file, or a shipped rig's name.")] = "virtual_lab_camera",
+    scenario: Annotated[str, typer.Option(help="A shipped scenario's name or a file.")] = "paper",
+) -> None:
+    """Own a rig's camera and show its frames to the perception node until Ctrl-C."""
+    resolved = resolve(rig=rig, scenario=scenario)
+    with StopRequest() as end:
+        load(SHOWER)(resolved, end=end)

@@ -13,9 +13,11 @@ from time import monotonic_ns
 import msgspec
 
 from config.scenario import Scenario
+from robot.bus.camera_rows import Forget
+from robot.bus.errors import BusError
 from robot.bus.inlet import Received
 from robot.bus.session import Bus
-from robot.bus.topics import PERCEPT
+from robot.bus.topics import FORGET, PERCEPT
 from robot.errors import StaleStateError
 from robot.hal.protocols import Camera
 from robot.messages import ArmState, Percept, SceneState, Vec3
@@ -51,6 +53,7 @@ class RemotePerception:
         self._newest: Received[Percept] | None = None
         self._n = 0
         self._is_new_table = True
+        self._forgets = bus.asker(FORGET)
         self._subscriber = bus.subscriber(PERCEPT, self._take)
 
     def watch(self, cameras: Mapping[str, Camera]) -> None:
@@ -60,7 +63,7 @@ class RemotePerception:
         """Acquire nothing: percepts come where there are any."""
 
     def forget(self) -> None:
-        """Wait for percepts of a table that was laid out, at the next look."""
+        """Have the perception node forget what it saw, and wait for percepts of the new table, at the next look."""
         self._is_new_table = True
 
     def perceive(self, arm: ArmState, scene: SceneState | None) -> Percept:
@@ -86,14 +89,31 @@ class RemotePerception:
         self._subscriber.close()
 
     def _await_table(self, arm: ArmState) -> None:
-        """Wait for some percepts from now on: the arm rests meanwhile."""
+        """Wait for some percepts from now on, until one knows where anything is: the arm rests meanwhile.
+
+        Raises:
+            StaleStateError: the perception node does not say that it has forgotten the table before.
+        """
+        try:
+            self._forgets.ask(Forget())
+        except BusError as error:
+            self._is_new_table = True
+            raise StaleStateError(f"a new table: {error}; does the perception node run?") from error
         self._newest = None
         end_ns = self._now_ns() + round(FIRST_S * 1e9)
         wanted = self._n + N_FIRST
-        while self._n < wanted and self._now_ns() < end_ns and not self._gives_up():
+        while not self._is_settled(wanted) and self._now_ns() < end_ns and not self._gives_up():
             self._tell(arm)
             with self._came:
-                self._came.wait_for(lambda: self._n >= wanted, 10 * ANSWER_S)
+                self._came.wait_for(lambda: self._is_settled(wanted), 10 * ANSWER_S)
+
+    def _is_settled(self, wanted: int) -> bool:
+        """Whether so many percepts came, and the newest shows a table: a camera needs a frame of it first."""
+        newest = self._newest
+        if self._n < wanted or newest is None:
+            return False
+        things = newest.message.objects
+        return not things or any(thing.is_valid for thing in things)
 
     def _is_at(self, arm: ArmState) -> bool:
         return self._newest is not None and self._newest.message.stamp_ns == arm.stamp_ns

@@ -1,23 +1,30 @@
 """`autotelic up RIG`: start a rig's processes and see to them until Ctrl-C or until the job is done. The edge."""
 
+import math
 from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from shutil import disk_usage
+from time import monotonic
 from typing import TYPE_CHECKING, Annotated
 
 import msgspec
+import numpy as np
 import typer
 from rich.console import Console
 from rich.live import Live
 
 from config.loader import resolve
 from config.resolved import Resolved
+from config.rig import Rig
 from config.sources import read_source
 from robot.stop_request import StopRequest
 
 if TYPE_CHECKING:
+    from robot.up.faults import RandomFaults
     from robot.up.night_watch import NightWatch
+    from robot.up.plan import NodePlan
     from robot.up.summary import Summary
+    from robot.up.supervisor import Supervisor
 
 __all__ = ["up"]
 
@@ -36,6 +43,11 @@ def up(
     alert: Annotated[
         str, typer.Option(help="With --night: a command that is told, as its last word, how it ended.")
     ] = "",
+    fault_every: Annotated[
+        float, typer.Option(min=0.0, help="Seconds between faults on purpose, of a virtual plant alone; 0: none.")
+    ] = 0.0,
+    seed: Annotated[int, typer.Option(min=0, help="With --fault-every: which faults are drawn.")] = 0,
+    seconds: Annotated[float, typer.Option(min=0.0, help="Ends after so long; 0: when its job is done.")] = 0.0,
     json: Annotated[bool, typer.Option("--json", help="Print a summary as one JSON object at the end.")] = False,
 ) -> None:
     """Start a rig's processes, watch them, start again what ends, and end them on Ctrl-C: the arm first and last.
@@ -51,7 +63,6 @@ def up(
     from robot.up.plan import plans_of
     from robot.up.summary import Event
     from robot.up.supervisor import Supervisor
-    from robot.up.table import status_table
 
     resolved = resolve(rig=rig, scenario=scenario)
     found = resolved.rig
@@ -72,12 +83,16 @@ def up(
     if watch is not None:
         check_night(found, hours=hours, free_bytes=disk_usage(folder).free)
     logs = Logs(folder / "logs")
-    supervisor = Supervisor(plans, make_bus=make_bus, logs=logs, rig=found.name, tell=tell, night=watch)
-    shown: AbstractContextManager[Live | None] = (
-        Live(console=console, refresh_per_second=4) if console.is_terminal else nullcontext()
+    supervisor = Supervisor(
+        plans,
+        make_bus=make_bus,
+        logs=logs,
+        rig=found.name,
+        tell=tell,
+        night=watch,
+        faults=_faults_of(found, plans, fault_every, seed),
     )
-    with StopRequest() as end, shown as live:
-        summary = supervisor.run(end, look=lambda: None if live is None else live.update(status_table(supervisor)))
+    summary = _run(supervisor, console, seconds)
     logs.close()
     if watch is not None:
         _leave_word(watch, supervisor.why_over, summary, folder)
@@ -86,6 +101,35 @@ def up(
     else:
         typer.echo(f"{summary.seconds:.0f} s, {len(summary.events)} events; logs in {summary.logs}", err=True)
     raise typer.Exit(summary.exit_code)
+
+
+def _faults_of(rig: Rig, plans: "tuple[NodePlan, ...]", every_s: float, seed: int) -> "RandomFaults | None":
+    """Return the faults that are asked for; None where none are.
+
+    Raises:
+        RobotConfigError: the rig's plant is not a virtual one.
+    """
+    from robot.up.faults import RandomFaults, check_faults
+
+    if not every_s:
+        return None
+    check_faults(rig)
+    return RandomFaults([plan.name for plan in plans], every_s=every_s, rng=np.random.default_rng(seed))
+
+
+def _run(supervisor: "Supervisor", console: Console, seconds: float) -> "Summary":
+    """Run it until Ctrl-C, until its job is done, or for so long, with a live table in a terminal."""
+    from robot.up.table import status_table
+
+    shown: AbstractContextManager[Live | None] = (
+        Live(console=console, refresh_per_second=4) if console.is_terminal else nullcontext()
+    )
+    end_s = monotonic() + seconds if seconds else math.inf
+    with StopRequest() as end, shown as live:
+        return supervisor.run(
+            lambda: end() or monotonic() > end_s,
+            look=lambda: None if live is None else live.update(status_table(supervisor)),
+        )
 
 
 def _leave_word(watch: "NightWatch", why_over: str | None, summary: "Summary", folder: Path) -> None:

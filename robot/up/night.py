@@ -9,10 +9,21 @@ from collections import deque
 import msgspec
 
 from config.rig import Rig
+from robot.bus.camera_rows import Light
 from robot.bus.station_rows import StationReport
 from robot.errors import RobotConfigError
 
-__all__ = ["BYTES_AN_HOUR", "LEAST_FREE_BYTES", "MOST_AN_HOUR", "MOST_IN_8_H", "StopBudget", "Stopped", "check_night"]
+__all__ = [
+    "BYTES_AN_HOUR",
+    "DARK_S",
+    "LEAST_FREE_BYTES",
+    "MOST_AN_HOUR",
+    "MOST_IN_8_H",
+    "LightWatch",
+    "StopBudget",
+    "Stopped",
+    "check_night",
+]
 
 MOST_AN_HOUR, HOUR_S = 3, 3600.0
 MOST_IN_8_H, SHIFT_S = 25, 8 * 3600.0
@@ -20,6 +31,8 @@ BYTES_AN_HOUR = 500_000_000
 """Of a recording on the bus, twice what was measured."""
 LEAST_FREE_BYTES = 1_000_000_000
 N_KEPT = 200
+DARK_S = 60.0
+"""So long a run waits for its light, the arm held: people step before cameras, cameras are taken anew."""
 
 
 class Stopped(msgspec.Struct, frozen=True, kw_only=True):
@@ -62,6 +75,27 @@ class StopBudget:
             if n > most:
                 return f"expected at most {most} stops in {words}, came {n}, the last for {self.stops[-1].reason}"
         return None
+
+
+class LightWatch:
+    """Minds how long no picture has shown the table, by what perception tells. Without a camera it is told nothing."""
+
+    def __init__(self) -> None:
+        self._newest: Light | None = None
+
+    def take(self, light: Light) -> None:
+        """Note how it is."""
+        self._newest = light
+
+    def why_dark(self) -> str | None:
+        """Return why the run has to end, None where it may go on."""
+        light = self._newest
+        if light is None or light.dark_s <= DARK_S:
+            return None
+        return (
+            f"camera {light.camera}: expected pictures of a lit table, none came for {light.dark_s:.0f} s: is the "
+            "light on, is the camera covered?"
+        )
 
 
 def check_night(rig: Rig, *, hours: float, free_bytes: int) -> None:

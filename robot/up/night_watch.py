@@ -7,9 +7,9 @@ from collections.abc import Callable
 from pathlib import Path
 
 from robot.bus.session import Bus
-from robot.bus.topics import REPORT
+from robot.bus.topics import LIGHT, REPORT
 from robot.errors import RobotConfigError
-from robot.up.night import LEAST_FREE_BYTES, StopBudget
+from robot.up.night import LEAST_FREE_BYTES, LightWatch, StopBudget
 
 __all__ = ["NightWatch"]
 
@@ -32,7 +32,7 @@ class NightWatch:
     """
 
     def __init__(self, folder: Path, *, alert: str = "", say: Callable[[str], object] = lambda _: None) -> None:
-        self.budget = StopBudget()
+        self.budget, self._light = StopBudget(), LightWatch()
         self._folder, self._alert, self._say = folder, shlex.split(alert), say
         self._looked_s: float | None = None
         self._free_bytes = 0
@@ -40,7 +40,8 @@ class NightWatch:
             raise RobotConfigError(f"--alert: expected a command that there is, came {self._alert[0]!r}")
 
     def listen(self, bus: Bus, now_s: Callable[[], float]) -> None:
-        """Hear what the robot node tells of itself, from now on."""
+        """Hear what the robot node tells of itself, and perception of the light, from now on."""
+        bus.subscriber(LIGHT, lambda received: self._light.take(received.message))
         bus.subscriber(REPORT, lambda received: self.budget.take(received.message, now_s()))
 
     def why_over(self, now_s: float) -> str | None:
@@ -49,7 +50,7 @@ class NightWatch:
             self._looked_s, self._free_bytes = now_s, shutil.disk_usage(self._folder).free
         if self._free_bytes < LEAST_FREE_BYTES:
             return f"expected {LEAST_FREE_BYTES / 1e9:g} GB free on the disk, there are {self._free_bytes / 1e9:.2f}"
-        return self.budget.why_spent(now_s)
+        return self._light.why_dark() or self.budget.why_spent(now_s)
 
     def tell(self, what: str) -> None:
         """Tell whoever is to be told; a command that fails or hangs is told of here, and ends nothing."""

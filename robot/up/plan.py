@@ -9,11 +9,14 @@ import msgspec
 from config.rig import Rig
 from robot.errors import RobotConfigError
 
-__all__ = ["Backoff", "NodePlan", "plans_of"]
+__all__ = ["Backoff", "NodePlan", "is_own_end", "plans_of"]
 
 FIRST_S, MOST_S = 0.5, 30.0
 MANY, WITHIN_S = 6, 600.0
 """More restarts than this within so long and it is given up."""
+BLAMED_S = 60.0
+"""A job that ends so soon after what it needs was away ended for that: it waits 30 s for a robot node itself."""
+JOB = "job"
 
 
 class NodePlan(msgspec.Struct, frozen=True, kw_only=True):
@@ -76,8 +79,28 @@ class Backoff:
     def __init__(self) -> None:
         self._at_s: deque[float] = deque(maxlen=MANY + 1)
 
-    def delay_s(self, now_s: float) -> float | None:
-        """Note that the process ended, and return how long to wait; None where it is given up."""
-        self._at_s.append(now_s)
+    def delay_s(self, now_s: float, *, is_own: bool = True) -> float | None:
+        """Note that the process ended, and return how long to wait; None where it is given up.
+
+        Args:
+            now_s: when.
+            is_own: it ended by itself; False where another one that it needs did, whose restarts are counted there.
+        """
+        if is_own:
+            self._at_s.append(now_s)
         n = sum(now_s - at_s <= WITHIN_S for at_s in self._at_s)
-        return None if n > MANY else min(MOST_S, FIRST_S * 2 ** (n - 1))
+        return None if n > MANY else min(MOST_S, FIRST_S * 2 ** max(0, n - 1))
+
+
+def is_own_end(kind: str, now_s: float, ended_s: float | None) -> bool:
+    """Tell whether a process's end is its own, and not that of one that it needs.
+
+    Whoever commands the arm ends with an error where the robot node, the hub or the eyes are away: a robot node that
+    was killed a few times used up the learner's restarts, and the learner was given up for it.
+
+    Args:
+        kind: of the process.
+        now_s: when it ended.
+        ended_s: when one that the job needs ended or fell silent last; None where none did.
+    """
+    return kind != JOB or ended_s is None or now_s - ended_s > BLAMED_S

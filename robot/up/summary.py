@@ -38,6 +38,8 @@ class NodeSummary(msgspec.Struct, frozen=True, kw_only=True):
     most_mb: float
     grown_mb: float
     """Greatest memory less what it first told of, over all its starts."""
+    slope_mb_h: float | None = None
+    """How fast its memory grew once it had been up for half a minute; None where it never was."""
     last_error: str
 
 

@@ -15,9 +15,10 @@ from robot.bus.topics import HEALTH
 from robot.node.stop_caller import StopCaller
 from robot.up.child import Child
 from robot.up.clocks import ClockAsker, ClockBook
+from robot.up.faults import RandomFaults
 from robot.up.logs import Logs
 from robot.up.night_watch import NightWatch
-from robot.up.plan import Backoff, NodePlan
+from robot.up.plan import Backoff, NodePlan, is_own_end
 from robot.up.summary import Event, NodeSummary, Summary, Worst
 from robot.up.watch import GONE_S, SILENT_S, HealthBook
 
@@ -28,8 +29,8 @@ START_S = 60.0
 STOP_S, NOW_S = 5.0, 1.0
 JOB_S, END_S = 30.0, 10.0
 USAGE, INTERRUPTED = 2, 130
-SPARE = "other"
-"""Kind of a process that the arm can do without."""
+JOB, SPARE = "job", "other"
+"""Kinds of a process: what commands the arm, and what it can do without."""
 
 
 class _Node:
@@ -45,6 +46,8 @@ class _Node:
         self.again_s: float | None = None
         """When it is started again."""
         self.is_silent = self.is_over = False
+        self.is_faulted = False
+        """Its next end was brought about on purpose."""
 
 
 class Supervisor:
@@ -57,13 +60,14 @@ class Supervisor:
         rig: its name.
         tell: told of every event.
         night: watches over a run that nobody attends; None where somebody does.
+        faults: brought about on purpose, once everything has started; None where there are none.
         now_s: the monotonic clock.
     """
 
     def __init__(
         self, plans: tuple[NodePlan, ...], *, make_bus: Callable[[], Bus], logs: Logs, rig: str,
         tell: Callable[[Event], object] = lambda _: None, night: NightWatch | None = None,
-        now_s: Callable[[], float] = monotonic,
+        faults: RandomFaults | None = None, now_s: Callable[[], float] = monotonic,
     ) -> None:  # fmt: skip
         self.nodes = {plan.name: _Node(plan) for plan in plans}
         self._make_bus, self._logs, self._rig, self._tell, self._now_s = make_bus, logs, rig, tell, now_s
@@ -72,7 +76,7 @@ class Supervisor:
         self._bus: Bus | None = None
         self._stops: StopCaller | None = None
         self.book = HealthBook(tuple(self.nodes), clock=clock_number(), now_s=now_s)
-        self._night = night
+        self._night, self._faults = night, faults
         self.why_over: str | None = None
         """Why a run that nobody attends ended by itself."""
         self.clocks = ClockBook()
@@ -81,6 +85,8 @@ class Supervisor:
         self._worst = Worst.NOTHING
         self._first_s: float | None = None
         self._last_s: float | None = None
+        self._away_s: float | None = None
+        """When a process that the job needs ended or fell silent last."""
 
     def run(self, should_end: Callable[[], bool], *, look: Callable[[], object] = lambda: None) -> Summary:
         """Start everything, and watch it until the job is over, something is given up, or one is told to end.
@@ -92,6 +98,7 @@ class Supervisor:
         try:
             if self._start_all(should_end, look):
                 while not should_end() and not self._is_over() and not self._is_spent():
+                    self._bring_about()
                     self._look()
                     look()
                     sleep(LOOK_S)
@@ -119,7 +126,7 @@ class Supervisor:
     def _start(self, node: _Node) -> None:
         node.n_starts += 1
         node.begun_s = self._now_s()
-        node.again_s, node.is_silent = None, False
+        node.again_s, node.is_silent, node.is_faulted = None, False, False
         node.child = Child(node.plan, self._logs)
         self.book.begin(node.plan.name, node.child.pid)
         self._note(node, f"started as process {node.child.pid}")
@@ -145,6 +152,19 @@ class Supervisor:
         self._health = bus.subscriber(HEALTH, lambda received: self.book.take(received))
 
     # --------------------------------------------------------------------------------------------------------- watch
+
+    def _bring_about(self) -> None:
+        """Bring about what is due on purpose; a process that is away is left alone."""
+        for fault in () if self._faults is None else self._faults.due(self._now_s()):
+            node = self.nodes[fault.node]
+            if node.child is None or node.child.code is not None:
+                continue
+            if fault.is_begin:
+                node.is_faulted = True
+                self._note(node, f"on purpose: {fault.what}")
+            else:
+                node.is_faulted = False
+            node.child.send(fault.number)
 
     def _is_over(self) -> bool:
         return any(node.is_over for node in self.nodes.values())
@@ -188,6 +208,7 @@ class Supervisor:
         if not node.is_silent:
             node.is_silent = True
             is_needed = node.plan.kind != SPARE
+            self._note_away(node)
             self._note(node, f"silent for {SILENT_S:g} s{': the arm is stopped' if is_needed else ''}", Worst.MENDED)
             self._stop_arm(node)
         if self.book.is_silent(name, for_s=GONE_S, hub=self._hub):
@@ -202,15 +223,22 @@ class Supervisor:
             node.is_over = True
             self._note(node, "finished")
             return
+        is_own = not node.is_faulted and is_own_end(node.plan.kind, self._now_s(), self._away_s)
+        self._note_away(node)
         how = f"killed by signal {-code}" if code is not None and code < 0 else f"ended with exit code {code}"
         self._stop_arm(node)
-        delay_s = None if code == USAGE else node.backoff.delay_s(self._now_s())
+        delay_s = None if code == USAGE else node.backoff.delay_s(self._now_s(), is_own=is_own)
         if delay_s is None:
             node.is_over = True
             self._note(node, f"{how} ({child.last_line}): it is given up", Worst.FAILED)
             return
         node.again_s = self._now_s() + delay_s
         self._note(node, f"{how} ({child.last_line}): it is started again in {delay_s:g} s", Worst.MENDED)
+
+    def _note_away(self, node: _Node) -> None:
+        """Note that a process is away, if it is one that the job needs."""
+        if node.plan.kind not in (JOB, SPARE):
+            self._away_s = self._now_s()
 
     def _stop_arm(self, node: _Node) -> None:
         """Say stop for a moment, unless the arm can do without that process: whoever holds it may be what ended."""
@@ -291,7 +319,7 @@ class Supervisor:
             nodes.append(
                 NodeSummary(
                     name=name, n_starts=node.n_starts, exit_code=node.code, most_late_ms=heard.most_late_ms,
-                    most_mb=heard.most_mb, grown_mb=heard.most_mb - heard.first_mb,
+                    most_mb=heard.most_mb, grown_mb=heard.most_mb - heard.first_mb, slope_mb_h=heard.slope.mb_h,
                     last_error="" if heard.health is None else heard.health.last_error,
                 )
             )  # fmt: skip

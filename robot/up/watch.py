@@ -6,6 +6,7 @@ import msgspec
 
 from robot.bus.inlet import Received
 from robot.bus.station_rows import Health
+from robot.up.slope import MemorySlope
 
 __all__ = ["GONE_S", "SILENT_S", "HealthBook", "Heard"]
 
@@ -29,6 +30,7 @@ class Heard(msgspec.Struct, kw_only=True):
     most_late_ms: float = 0.0
     most_mb: float = 0.0
     first_mb: float = 0.0
+    slope: MemorySlope = msgspec.field(default_factory=MemorySlope)
 
 
 class HealthBook:
@@ -51,6 +53,7 @@ class HealthBook:
         """Note that a process was started: what was heard of it before says nothing of it."""
         heard = self._by_name[name]
         heard.heard_s, heard.pid, heard.is_leaving = None, pid, False
+        heard.slope.begin(self._now_s())
 
     def take(self, received: Received[Health]) -> None:
         """Take a word in. Called on the bus's thread."""
@@ -61,6 +64,7 @@ class HealthBook:
         heard.first_mb = heard.first_mb or health.rss_mb
         heard.most_late_ms = max(heard.most_late_ms, health.late_ms)
         heard.most_mb = max(heard.most_mb, health.rss_mb)
+        heard.slope.note(self._now_s(), health.rss_mb)
         heard.is_same_clock = health.clock == self._clock
         heard.is_leaving = health.is_leaving
         heard.health, heard.heard_s = health, None if health.is_leaving else self._now_s()

@@ -1,5 +1,8 @@
 """The twin on the bus: its truth 100 times a second, and resets of its table. Polled by the controller's loop.
 
+How all its bodies stand goes out too, 50 times a second, for a process that renders a camera: a simulated world has no
+light that would bring it there.
+
 Whoever resets the table of a cell also looks after an arm that has stopped: a protective stop is unlocked, when five
 seconds have passed since, and the program that it interrupted is ended, before the table is laid out. Other stops stay.
 A reset waits a second for a program that is ending and an arm that is coming to rest. What is no reset request is
@@ -7,15 +10,17 @@ answered with an error before anything else: it unlocks and ends nothing.
 """
 
 from robot.bus import CELL, RESET, TRUTH, Asked, Bus, CellAction, CellTruth, ResetDone, ResetRequest, Role
+from robot.bus.topics import TWIN_POSE
 from robot.node import HealthTeller, Pulse
 from sim_twin.controller.robot import VirtualRobot
 from sim_twin.controller.table_hands import TableHands
 from sim_twin.controller.wire.dashboard_target import Outcome
 from sim_twin.plant import TwinTruth
+from sim_twin.twin_pose import pose_of
 
 __all__ = ["BusPort"]
 
-TRUTH_SLICES, SLICES_PER_S = 5, 500.0
+TRUTH_SLICES, POSE_SLICES, SLICES_PER_S = 5, 10, 500.0
 PATIENCE_SLICES = 500
 """How long a program may take to end, and the arm to come to rest, once a reset was asked for."""
 
@@ -41,7 +46,7 @@ class BusPort:
         serial = robot.panel.status().serial_number
         self._bus = Bus(endpoint, serial=serial, role=Role.TWIN, is_hub=True, keys=keys)
         self._bus.open()
-        self._publisher = self._bus.publisher(TRUTH)
+        self._publisher, self._poses = self._bus.publisher(TRUTH), self._bus.publisher(TWIN_POSE)
         self._resets, self._actions = self._bus.answerer(RESET), self._bus.answerer(CELL)
         self._hands = TableHands(robot.machine.world)
         self._pulse = Pulse(target_hz=SLICES_PER_S)
@@ -68,6 +73,8 @@ class BusPort:
             self._act(action)
         if n_slices % TRUTH_SLICES == 0:
             self._publisher.put(self._truth.read())
+        if n_slices % POSE_SLICES == 0:
+            self._poses.put(pose_of(self._robot.machine.world))
 
     def close(self) -> None:
         """Leave the bus. Idempotent."""

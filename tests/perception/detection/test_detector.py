@@ -12,7 +12,7 @@ from perception.detection.regions import Region
 from perception.detection.seen import LampState, LidState, Stance
 from perception.errors import CalibrationRefusedError, PerceptionConfigError
 from robot.frames import frame_of, picture_of
-from tests.support.painted_table import CAMERA, SCENARIO, guided_sample, nominal, painted
+from tests.support.painted_table import CAMERA, SCENARIO, guided_sample, nominal, painted, seen_at
 
 BUTTONS = tuple(b.name for b in SCENARIO.buttons)
 BOXES = tuple(b.name for b in SCENARIO.boxes)
@@ -133,3 +133,38 @@ def test_a_sample_without_light_or_with_a_region_too_small_is_refused():
     speck = Region(image="off", name="speck", polygon_px=((700.0, 600.0), (703.0, 600.0), (703.0, 603.0)))
     with pytest.raises(CalibrationRefusedError, match="60 pixels or more of speck"):
         learn_colours(frames, [*regions, speck], camera=CAMERA, scenario=SCENARIO)
+
+
+AWAY = (0.4, 3.0, 0.0)
+"""Off the picture."""
+AT = (0.66, 0.0, 0.03)
+FAR_PX = np.array([[2.0, 2.0], [6.0, 2.0], [6.0, 6.0]])
+
+
+@functools.cache
+def cleared(lids_open=BOXES):
+    """The table without its red cylinder; shut boxes hide nothing of where it stood."""
+    return painted(nominal() | {"red_cylinder": np.array(AWAY)}, lids_open=lids_open, seed=21)
+
+
+@pytest.mark.parametrize(
+    ("picture", "before", "is_gone"),
+    [
+        ("cleared", [FAR_PX], True),
+        ("cleared", [], False),
+        ("cleared", ["arm"], False),
+        ("there", [FAR_PX], False),
+    ],
+    ids=["seen past", "the arm not known", "the arm before it", "still there"],
+)
+def test_a_cylinder_is_gone_where_one_sees_past_its_place_and_only_there(picture, before, is_gone):
+    there = nominal() | {"red_cylinder": np.array([*AT[:2], 0.0])}
+    frame = cleared() if picture == "cleared" else painted(there, lids_open=BOXES, seed=22)
+    u, v = seen_at(np.array([AT]))[0]
+    arm = np.array([[u - 9, v - 40], [u + 40, v - 40], [u + 40, v + 40], [u - 9, v + 40]])
+    found = detector().look(frame, [arm if b is not FAR_PX else b for b in before], {"red_cylinder": AT})
+    assert things(found)["red_cylinder"].is_gone is is_gone
+
+
+def test_nothing_is_gone_that_was_never_seen():
+    assert not any(thing.is_gone for thing in detector().look(cleared(), [FAR_PX]).things)

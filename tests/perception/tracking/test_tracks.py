@@ -12,6 +12,7 @@ from perception.detection.seen import Detections, LampSeen, LampState, LidSeen, 
 from perception.tracking import ArmCourse, TableTracks
 from perception.tracking.lamp import LampTrack
 from perception.tracking.place import PlaceTrack, Steadiness
+from perception.tracking.tracks import N_GONE
 from robot.messages import ArmMode, ArmState, GripState
 
 SCENARIO = resolve().scenario
@@ -194,3 +195,38 @@ def test_a_loose_thing_that_newer_pictures_do_not_show_is_looked_for_all_over_no
     assert tracks.near(0)["red_cylinder"] == (0.45, 0.0, 0.03)
     tracks.note_picture(picture(400, at(None)))
     assert ["red_cylinder" in tracks.near(n) for n in range(5)] == [False, True, True, True, False]
+
+
+def gone(name="red_cylinder"):
+    return msgspec.structs.replace(at(None, name=name, stance=Stance.UNKNOWN, confidence=0.0), is_gone=True)
+
+
+@pytest.mark.parametrize(("n", "is_known"), [(N_GONE - 1, True), (N_GONE, False)])
+def test_a_thing_is_not_known_any_more_once_so_many_pictures_running_show_past_it(n, is_known):
+    tracks = TableTracks(SCENARIO)
+    tracks.note_picture(picture(0, at(0.5)))
+    for k in range(n):
+        tracks.note_picture(picture(50 * (k + 1), gone()))
+    now = tracks.thing("red_cylinder", arm(400))
+    assert now.is_valid is is_known
+    assert now.position_m == pytest.approx((0.5, 0.0, 0.03)), "where it was last"
+    assert ("red_cylinder" in tracks.near(1)) is is_known, "it is looked for everywhere"
+
+
+@pytest.mark.parametrize("between", [at(0.5), at(None, stance=Stance.UNKNOWN)], ids=["seen", "hidden"])
+def test_one_picture_that_does_not_show_past_a_thing_begins_the_count_anew(between):
+    tracks = TableTracks(SCENARIO)
+    tracks.note_picture(picture(0, at(0.5)))
+    for k in range(3 * N_GONE):
+        tracks.note_picture(picture(50 * (k + 1), between if k % N_GONE == 0 else gone()))
+    assert tracks.thing("red_cylinder", arm(400)).is_valid
+
+
+def test_a_thing_that_was_taken_away_is_known_where_it_is_put_back():
+    tracks = TableTracks(SCENARIO)
+    tracks.note_picture(picture(0, at(0.5)))
+    for k in range(N_GONE):
+        tracks.note_picture(picture(50 * (k + 1), gone()))
+    tracks.note_picture(picture(400, at(0.35, 0.1)))
+    back = tracks.thing("red_cylinder", arm(420))
+    assert (back.is_valid, back.position_m) == (True, (0.35, 0.1, 0.03))

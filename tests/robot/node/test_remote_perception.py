@@ -5,9 +5,11 @@ import math
 import msgspec
 import pytest
 
+from robot.bus.camera_rows import Forgotten
 from robot.bus.envelope import Envelope, Origin
+from robot.bus.errors import BusError
 from robot.bus.inlet import Received
-from robot.bus.topics import PERCEPT
+from robot.bus.topics import FORGET, PERCEPT
 from robot.errors import StaleStateError
 from robot.node.remote_perception import RemotePerception
 from robot.station_doors import Perceives, Sighted
@@ -24,10 +26,21 @@ class Air:
     """What stands for a bus: percepts come when a measurement is told, or when they are put."""
 
     error = None
+    n_forgotten, is_alone = 0, False
 
     def __init__(self, answer=None):
         self.now_ns, self.told, self._answer = 10_000_000_000, [], answer
         self.remote = RemotePerception(self, SCENARIO, tell=self._tell, now_ns=lambda: self.now_ns)
+
+    def asker(self, query):
+        assert query is FORGET
+        return self
+
+    def ask(self, request):
+        self.n_forgotten += 1
+        if self.is_alone:
+            raise BusError("percept/forget: expected an answer within 1 s, none came")
+        return Forgotten()
 
     def subscriber(self, topic, on_message):
         assert topic is PERCEPT
@@ -137,3 +150,38 @@ def test_a_new_table_is_waited_for_no_longer_where_somebody_says_stop():
     with pytest.raises(StaleStateError, match="none came"):
         air.remote.perceive(arm(air), None)
     assert len(air.told) == 3
+
+
+def test_a_new_table_is_forgotten_by_who_perceives_before_its_percepts_count():
+    air = Air(answer_at_once)
+    air.remote.perceive(arm(air), None)
+    air.remote.perceive(arm(air), None)
+    assert air.n_forgotten == 1
+    air.remote.forget()
+    air.remote.perceive(arm(air), None)
+    assert air.n_forgotten == 2
+
+
+def test_where_nobody_says_that_it_is_forgotten_nothing_is_perceived_and_it_is_asked_again():
+    air = Air(answer_at_once)
+    air.is_alone = True
+    for n in (1, 2):
+        with pytest.raises(StaleStateError, match="a new table: percept/forget"):
+            air.remote.perceive(arm(air), None)
+        assert air.n_forgotten == n
+    air.is_alone = False
+    assert air.remote.perceive(arm(air), None).stamp_ns == air.now_ns
+
+
+def test_of_a_new_table_percepts_are_waited_for_until_one_knows_where_anything_is():
+    told = []
+
+    def answer(air, state):
+        known = percept(PLACES, tcp_m=state.tcp_position_m, stamp_ns=state.stamp_ns)
+        unknown = tuple(msgspec.structs.replace(thing, is_valid=False) for thing in known.objects)
+        told.append(known if len(told) >= 6 else msgspec.structs.replace(known, objects=unknown))
+        air.put(told[-1], seen_ns=air.now_ns)
+
+    air = Air(answer)
+    assert air.remote.perceive(arm(air), None).objects[0].is_valid
+    assert len(told) == 8

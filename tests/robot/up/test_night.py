@@ -6,17 +6,20 @@ import msgspec
 import pytest
 
 from config.loader import load_rig
+from robot.bus.camera_rows import Light
 from robot.bus.station_rows import StationReport
 from robot.errors import RobotConfigError
 from robot.messages import StationMode, StationState
 from robot.up.morning import morning_report
 from robot.up.night import (
     BYTES_AN_HOUR,
+    DARK_S,
     HOUR_S,
     LEAST_FREE_BYTES,
     MOST_AN_HOUR,
     MOST_IN_8_H,
     SHIFT_S,
+    LightWatch,
     StopBudget,
     check_night,
 )
@@ -114,3 +117,33 @@ def test_the_morning_report_tells_how_it_ended_its_stops_and_what_was_started_ag
     assert text.startswith("# lab: 2.0 h, it failed\n")
     for told in ("* ended: too many", "0.50 an hour", "| robot | 2 | 200 MB | 5 MB | 3 ms | a/b |", "* 10 s: speed"):
         assert told in text
+
+
+def test_a_table_that_is_dark_for_longer_than_a_minute_ends_the_night_and_a_minute_does_not():
+    light = LightWatch()
+    assert light.why_dark() is None
+    light.take(Light(camera="table", dark_s=DARK_S))
+    assert light.why_dark() is None
+    light.take(Light(camera="table", dark_s=DARK_S + 0.01))
+    assert "camera table: expected pictures of a lit table, none came for 60 s" in (light.why_dark() or "")
+    light.take(Light(camera="table", dark_s=0.1))
+    assert light.why_dark() is None
+
+
+def test_a_watch_ends_the_night_for_the_light_that_perception_tells_of(tmp_path, monkeypatch):
+    monkeypatch.setattr("robot.up.night_watch.shutil.disk_usage", lambda _: type("Usage", (), {"free": 10**12}))
+
+    class Air:
+        """What stands for a bus."""
+
+        def subscriber(self, topic, on_message):
+            taken[topic.name] = on_message
+
+    class Came:
+        message = Light(camera="table", dark_s=2.0 * DARK_S)
+
+    taken, watch = {}, NightWatch(tmp_path)
+    watch.listen(Air(), lambda: 0.0)
+    assert watch.why_over(1.0) is None
+    taken["camera/light"](Came())
+    assert "lit table" in (watch.why_over(1.0) or "")

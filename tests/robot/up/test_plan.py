@@ -9,7 +9,7 @@ from robot.bus.envelope import Envelope, Origin
 from robot.bus.inlet import Received
 from robot.bus.station_rows import Health
 from robot.errors import RobotConfigError
-from robot.up.plan import FIRST_S, MANY, MOST_S, WITHIN_S, Backoff, plans_of
+from robot.up.plan import BLAMED_S, FIRST_S, MANY, MOST_S, WITHIN_S, Backoff, is_own_end, plans_of
 from robot.up.watch import GONE_S, SILENT_S, HealthBook
 
 RIG = load_rig("virtual_lab")
@@ -60,6 +60,26 @@ def test_restarts_of_long_ago_count_no_more():
     backoff = Backoff()
     for k in range(3 * MANY):
         assert backoff.delay_s(k * (WITHIN_S + 1.0)) == FIRST_S
+
+
+def test_ends_for_what_another_process_did_are_restarted_and_not_counted():
+    backoff = Backoff()
+    for k in range(3 * MANY):
+        assert backoff.delay_s(float(k), is_own=False) == FIRST_S
+    delays = [backoff.delay_s(100.0 + k) for k in range(MANY + 1)]
+    assert delays[-2:] == [min(MOST_S, FIRST_S * 2 ** (MANY - 1)), None]
+    assert backoff.delay_s(100.0 + MANY, is_own=False) is None
+
+
+@pytest.mark.parametrize(
+    ("kind", "ended_s", "is_own"),
+    [
+        ("job", None, True), ("job", 40.0, False), ("job", 40.0 - 1e-3, True),
+        ("robot", 99.0, True), ("hub", 99.0, True), ("other", 99.0, True),
+    ],
+)  # fmt: skip
+def test_only_a_job_s_end_is_put_down_to_what_it_needs_and_that_for_a_minute(kind, ended_s, is_own):
+    assert is_own_end(kind, 40.0 + BLAMED_S, ended_s) is is_own
 
 
 class Book:
