@@ -185,13 +185,14 @@ class Gate:
         refusal = check_finite(command)
         if refusal is not None:
             return refusal
-        force_n, stops = math.hypot(*state.tcp_force_n), self._stops
-        said = self._at_once(command, state, now_ns) if force_n <= self._quiet_n else UNSURE
+        force_n, stops, cross = math.hypot(*state.tcp_force_n), self._stops, self._cross
+        if cross is None or not force_n <= self._quiet_n:
+            return self._check_each(command, state, now_ns, force_n)
+        said = self._at_once(command, state, now_ns, cross)
         if said == UNSURE:
             return self._check_each(command, state, now_ns, force_n)
         self._force_before_n, self._is_pushed = force_n, False
-        if self._cross is not None:
-            self._cross.agree()
+        cross.agree()
         if stops is None:
             return None
         if said == FREE:
@@ -199,9 +200,9 @@ class Gate:
             return None
         return stops.check(command.q_rad, self._course.last_rad, state)
 
-    def _at_once(self, command: ArmCommand, state: ArmState, now_ns: int) -> int:
+    def _at_once(self, command: ArmCommand, state: ArmState, now_ns: int, cross: CrossCheck) -> int:
         """Return what passed_at_once says of a command that moves and whose tags are in order; otherwise UNSURE."""
-        limits, course, stops, cross = self._limits, self._course, self._stops, self._cross
+        limits, course, stops = self._limits, self._course, self._stops
         q, last_rad, befores = command.q_rad, course.last_rad, course.only
         oldest_ns = now_ns - limits.state_max_age_ns
         is_in_order = (
@@ -213,7 +214,6 @@ class Gate:
             and command.grip is self._grip
             and not command.digital_out & ~limits.output_mask
             and self._force_before_n <= limits.contact_n
-            and cross is not None
             and not cross.is_first
             and 0 <= now_ns - self._intent_ns <= limits.intent_max_age_ns
             and (self._percept_ns is None or 0 <= now_ns - self._percept_ns <= limits.percept_max_age_ns)
