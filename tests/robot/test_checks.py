@@ -12,7 +12,6 @@ from robot.kinematics import Kinematics
 from robot.messages import ArmMode, ArmSpec, GripCommand, Heading, Hold, JointTarget, Twist
 from robot.safety import GateLimits, Reason
 from robot.safety.checks import (
-    PUSH_SHARE,
     check_finite,
     check_force,
     check_grip,
@@ -311,7 +310,6 @@ def test_motion_passes_up_to_the_age_of_a_percept_and_never_with_one_of_the_futu
     assert passes or refusal.reason is Reason.STALE_PERCEPT
 
 
-LEANT = PUSH_SHARE * STEADY
 SINK, RISE = (0.0, 0.0, -0.001), (0.0, 0.0, 0.001)
 JUST_OVER = math.nextafter(LIMITS.contact_n, math.inf)
 
@@ -319,16 +317,16 @@ JUST_OVER = math.nextafter(LIMITS.contact_n, math.inf)
 @pytest.mark.parametrize(
     ("now_n", "before_n", "step", "passes"),
     [
-        (LEANT, LEANT, SINK, True),
-        (math.nextafter(LEANT, math.inf), LEANT, SINK, False),
-        ((LEANT + 200.0) / 2.0, 200.0, SINK, True),
-        ((LEANT + 200.0) / 2.0 + 1e-9, 200.0, SINK, False),
-        (LEANT + 50.0, LEANT, RISE, True),
-        (LEANT + 50.0, LEANT, (0.0, 0.0, 0.0), True),
-        (LEANT + 50.0, LEANT, (0.01, 0.0, 0.0), True),
-        (LEANT, LIMITS.contact_n, SINK, True),
-        (LEANT, JUST_OVER, SINK, False),
-        (LEANT - 1.0, 2.0 * LEANT, SINK, True),
+        (STEADY, STEADY, SINK, True),
+        (math.nextafter(STEADY, math.inf), STEADY, SINK, False),
+        ((STEADY + 200.0) / 2.0, 200.0, SINK, True),
+        ((STEADY + 200.0) / 2.0 + 1e-9, 200.0, SINK, False),
+        (STEADY + 50.0, STEADY, RISE, True),
+        (STEADY + 50.0, STEADY, (0.0, 0.0, 0.0), True),
+        (STEADY + 50.0, STEADY, (0.01, 0.0, 0.0), True),
+        (STEADY, LIMITS.contact_n, SINK, True),
+        (STEADY, JUST_OVER, SINK, False),
+        (STEADY - 1.0, 2.0 * STEADY, SINK, True),
     ],
     ids=[
         "at it", "next float", "rising up to it", "rising beyond", "gives way", "holds still", "slides along",
@@ -340,7 +338,16 @@ def test_a_push_that_lasts_may_not_be_pressed_on_beyond_the_limit(now_n, before_
     assert (refusal is None) is passes
     if refusal is not None:
         assert refusal.reason is Reason.FORCE
-        assert refusal.amount == pytest.approx(2.0 * now_n - before_n - LEANT, abs=1e-6)
+        assert refusal.amount == pytest.approx(2.0 * now_n - before_n - STEADY, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("force_n", "passes"),
+    [((0.6 * STEADY, 0.0, 0.4 * STEADY), True), ((0.0, -0.6 * STEADY, 0.4 * STEADY + 1e-6), False)],
+)
+def test_what_presses_from_the_side_counts_beside_what_presses_upright(force_n, passes):
+    into = tuple(-1e-6 * f for f in force_n)
+    assert (check_push(force_n, STEADY, into, LIMITS) is None) is passes
 
 
 @given(
@@ -350,5 +357,5 @@ def test_a_push_that_lasts_may_not_be_pressed_on_beyond_the_limit(now_n, before_
 def test_whatever_presses_on_and_passes_is_no_harder_by_the_next_tick_than_it_may_be(force, before, step):
     refusal = check_push(force, before, step, LIMITS)
     if refusal is None and sum(f * s for f, s in zip(force, step, strict=True)) < 0.0 and before > LIMITS.contact_n:
-        now = math.hypot(*force)
-        assert now + max(0.0, now - before) <= PUSH_SHARE * LIMITS.force_max_n
+        now, both = math.hypot(*force), math.hypot(*force[:2]) + abs(force[2])
+        assert both + max(0.0, now - before) <= LIMITS.force_max_n
