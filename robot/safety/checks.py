@@ -268,7 +268,8 @@ def check_force(force_n: float, force_before_n: float, limits: GateLimits) -> Re
 def check_push(force_n: Vec3, before_n: float, step_m: Vec3, limits: GateLimits) -> Refusal | None:
     """Refuse to press on where a push that lasts would be harder than it may be by the end of the tick.
 
-    What gives way, or holds still, does not press on.
+    What gives way, or holds still, does not press on. What presses from the side counts beside what presses upright:
+    between two leaves of a lid a wrist felt 48 N of the 65 of both.
 
     Args:
         force_n: force of the world on the tool.
@@ -276,13 +277,14 @@ def check_push(force_n: Vec3, before_n: float, step_m: Vec3, limits: GateLimits)
         step_m: where the command moves the tool centre point.
         limits: the forces that may be.
     """
-    now_n = math.hypot(*force_n)
-    ahead_n = now_n + max(0.0, now_n - before_n)
+    (x, y, z), now_n = force_n, math.hypot(*force_n)
+    pressed_n = math.hypot(x, y) + abs(z)
+    ahead_n = pressed_n + max(0.0, now_n - before_n)
     if before_n <= limits.contact_n or ahead_n <= limits.force_max_n:
         return None
     if sum([f * s for f, s in zip(force_n, step_m, strict=True)]) >= 0.0:
         return None
-    detail = f"expected at most {limits.force_max_n:g} N on the tool by the next tick, it presses on at {now_n:g}"
+    detail = f"expected at most {limits.force_max_n:g} N on the tool by the next tick, it presses on at {pressed_n:g}"
     return Refusal(Reason.FORCE, detail, ahead_n - limits.force_max_n)
 
 

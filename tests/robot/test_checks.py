@@ -341,6 +341,15 @@ def test_a_push_that_lasts_may_not_be_pressed_on_beyond_the_limit(now_n, before_
         assert refusal.amount == pytest.approx(2.0 * now_n - before_n - STEADY, abs=1e-6)
 
 
+@pytest.mark.parametrize(
+    ("force_n", "passes"),
+    [((0.6 * STEADY, 0.0, 0.4 * STEADY), True), ((0.0, -0.6 * STEADY, 0.4 * STEADY + 1e-6), False)],
+)
+def test_what_presses_from_the_side_counts_beside_what_presses_upright(force_n, passes):
+    into = tuple(-1e-6 * f for f in force_n)
+    assert (check_push(force_n, STEADY, into, LIMITS) is None) is passes
+
+
 @given(
     force=st.tuples(*[st.floats(-400.0, 400.0)] * 3), before=st.floats(0.0, 400.0),
     step=st.tuples(*[st.floats(-0.01, 0.01)] * 3),
@@ -348,5 +357,5 @@ def test_a_push_that_lasts_may_not_be_pressed_on_beyond_the_limit(now_n, before_
 def test_whatever_presses_on_and_passes_is_no_harder_by_the_next_tick_than_it_may_be(force, before, step):
     refusal = check_push(force, before, step, LIMITS)
     if refusal is None and sum(f * s for f, s in zip(force, step, strict=True)) < 0.0 and before > LIMITS.contact_n:
-        now = math.hypot(*force)
-        assert now + max(0.0, now - before) <= LIMITS.force_max_n
+        now, both = math.hypot(*force), math.hypot(*force[:2]) + abs(force[2])
+        assert both + max(0.0, now - before) <= LIMITS.force_max_n

@@ -42,7 +42,6 @@ MENDED = (
     pytest.param("attended", 588, GIVEN_WAY, id="a light push that was fallen back from at once"),
     pytest.param("unattended", 799, GIVEN_WAY, id="a light push again and again", marks=pytest.mark.slow),
     pytest.param("attended", 922, ("steady_force",), id="a bare pad on a button's rim"),
-    pytest.param("attended", 2487, ("steady_force",), id="a pad on a rim, written", marks=pytest.mark.slow),
     pytest.param("unattended", 1376, ("steady_force",), id="a pad on a rim, at a fence", marks=pytest.mark.slow),
     pytest.param("unattended", 2043, ("steady_force",), id="a pad on a rim, no load", marks=pytest.mark.slow),
     pytest.param("unattended", 2536, ("steady_force",), id="a pad on a rim, loaded", marks=pytest.mark.slow),
