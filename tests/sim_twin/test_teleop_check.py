@@ -301,7 +301,7 @@ def test_a_limit_that_binds_is_no_wider_than_what_it_was_and_the_weaker_one_is_b
 @pytest.mark.parametrize("name", ["greatest grip force", "joint stop jerk"])
 def test_a_limit_weakened_by_a_twentieth_is_told(attended, name):
     mutation = next(m for m in MUTATIONS if m.name == name)
-    outcome = try_mutation(attended.resolved, mutation, seed=0, n_streams=1, n_commands=120)
+    outcome = try_mutation(attended.resolved, mutation, seed=0, n_streams=1, n_commands=250)
     assert outcome.is_held, outcome
     assert outcome.is_caught, outcome
 
