@@ -1,6 +1,7 @@
 """Small pure functions on points, turns and the tool's frame, in plain floats."""
 
 import math
+from collections.abc import Sequence
 
 from robot.compiled import compiled
 from robot.messages import Quat, Vec3, Vec6
@@ -15,6 +16,7 @@ __all__ = [
     "tool_offset",
     "turn_about_vertical",
     "unwound",
+    "vec6",
 ]
 
 
@@ -85,3 +87,8 @@ def difference(a: Vec6, b: Vec6) -> Vec6:
 def between(a: Vec6, b: Vec6, share: float) -> Vec6:
     """Return joints a share of the way from a to b, beyond b where it is more than 1."""
     return stepped(a, difference(b, a), share)
+
+
+def vec6(values: Sequence[float]) -> Vec6:
+    """Return six numbers as a tuple.  (6,) -> (6,)"""
+    return values[0], values[1], values[2], values[3], values[4], values[5]

@@ -17,6 +17,7 @@ from config.sources import shipped_names
 from learning.abstract.protocol import Era, run_abstract
 from learning.abstract.rules import draw_rules
 from robot.bench import BenchReport, BenchResult, bench_report
+from robot.parent import end_with_parent
 
 __all__ = ["bench_baselines"]
 
@@ -33,7 +34,7 @@ def bench_baselines(*, full: bool) -> BenchReport:
     seeds = range(FIRST_SEED, FIRST_SEED + (MANY if full else FEW))
     presets = tuple(_different_presets())
     cells = [(name, seed) for name in presets for seed in seeds]
-    with ProcessPoolExecutor(mp_context=get_context("spawn")) as pool:
+    with ProcessPoolExecutor(mp_context=get_context("spawn"), initializer=end_with_parent) as pool:
         ran = pool.map(_eras, *zip(*cells, strict=True))
         shown = track(ran, "presets", total=len(cells), console=Console(stderr=True), transient=True)
         eras = dict(zip(cells, shown, strict=True))

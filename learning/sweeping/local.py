@@ -1,6 +1,5 @@
 """Cells as processes of this machine. The edge."""
 
-import ctypes
 import os
 import signal
 import subprocess
@@ -11,23 +10,22 @@ from pathlib import Path
 from typing import IO
 
 from learning.sweeping.executor import End, Job
+from robot.parent import end_with_parent
 
 __all__ = ["LocalExecutor"]
 
-PDEATHSIG = 1
 ONE_THREAD = dict.fromkeys(
     ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS"), "1"
 )  # fmt: skip
 """Cells side by side would take each other's processors."""
 MB = 1e6
 TAIL_BYTES = 4096
-_libc = ctypes.CDLL(None, use_errno=True)
 
 
-def _end_with_parent() -> None:
+def _end_with_sweep() -> None:
     """Have the kernel end this process with the sweep, however that ends; and leave Ctrl-C to the sweep."""
     os.setsid()
-    _libc.prctl(PDEATHSIG, signal.SIGKILL)
+    end_with_parent()
 
 
 class _Running:
@@ -36,7 +34,7 @@ class _Running:
         self._sink: IO[bytes] = log.open("ab")
         self.process = subprocess.Popen(
             [sys.executable, "-c", "from robot.cli import main; main()", *job.words],
-            stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=self._sink, preexec_fn=_end_with_parent,
+            stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=self._sink, preexec_fn=_end_with_sweep,
             env=os.environ | ONE_THREAD,
         )  # fmt: skip
         self.why_ended = ""

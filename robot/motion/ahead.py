@@ -2,7 +2,7 @@
 
 from robot.chain import ToolChain
 from robot.envelope import Envelope
-from robot.geometry import stepped
+from robot.geometry import stepped, vec6
 from robot.messages import Vec6
 from robot.motion.holding import (
     MARGIN_M,
@@ -84,7 +84,7 @@ class Ahead:
             base: the braking arm's.
             is_straight: the tool goes straight.
         """
-        there = self._chain.points(stepped(now_rad, _vec6(base), 1.0))
+        there = self._chain.points(stepped(now_rad, vec6(base), 1.0))
         ends = self._rest(now_rad, now, wanted), self._rest(now_rad, now, base)
         least_m = _least_m(is_straight=is_straight)
         share, name = 1.0, ""
@@ -105,7 +105,7 @@ class Ahead:
         if fastest <= 0.0:
             return now
         far = stretch(brake_share(fastest, self._envelope), self._envelope)
-        return self._chain.points(stepped(now_rad, _vec6(steps), far))
+        return self._chain.points(stepped(now_rad, vec6(steps), far))
 
     def _gap_m(self, index: int, place: Place) -> float:
         """Return what is left of a fence, or of the fingertips' height over the table."""
@@ -121,7 +121,3 @@ class Ahead:
 def _least_m(*, is_straight: bool) -> float:
     """Return the least gap at which a stop ends inside of a fence."""
     return -OVERRUN_M if is_straight else MARGIN_M
-
-
-def _vec6(x: list[float]) -> Vec6:
-    return x[0], x[1], x[2], x[3], x[4], x[5]

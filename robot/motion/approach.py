@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from config.arm import ArmConfig
 from robot.chain import ToolChain
 from robot.compiled import Table, compiled
+from robot.geometry import vec6
 from robot.messages import Vec3, Vec6
 from robot.motion.pieces import Pieces, whole
 from robot.safety import Block, Braking, Clearance
@@ -260,7 +261,7 @@ class Approach:
         J = self._clearance.tool_jacobian(now_rad)
         margin_m = self._margins.clearance_m
         walls = [
-            Wall(w.name, w.room, _over_tool(_vec6(w.slope), J), 1.0)
+            Wall(w.name, w.room, _over_tool(vec6(w.slope), J), 1.0)
             for w in self._bodies(now_rad, margin_m, _length(ahead))
         ]
         left, blamed = yielding(ahead, walls)
@@ -304,7 +305,7 @@ class Approach:
         margin_m = self._margins.clearance_m + overrun_m
         bodies = [*self._bodies(q_at, margin_m, _length(step))]
         yield
-        walls = [Wall(w.name, w.room, _over_tool(_vec6(w.slope), J), w.share) for w in (*bodies, *self._singular(q_at))]
+        walls = [Wall(w.name, w.room, _over_tool(vec6(w.slope), J), w.share) for w in (*bodies, *self._singular(q_at))]
         walls += self._fences(at_m, overrun_m)
         left, blamed = yielding(step, walls)
         yield
@@ -333,7 +334,7 @@ class Approach:
         left, blamed = yielding(step, list(self._bodies(q_at, margin, _length(step))))
         floor = min(margin, self._clearance.gap(q_at))
         for _ in range(HALVINGS):
-            there = _vec6([a + s for a, s in zip(q_at, left, strict=True)])
+            there = vec6([a + s for a, s in zip(q_at, left, strict=True)])
             if self._is_way_clear(q_at, there, floor - 1e-4):
                 return there, blamed
             left = [0.5 * x for x in left]
@@ -341,7 +342,7 @@ class Approach:
 
     def _is_way_clear(self, a: Vec6, b: Vec6, margin: float) -> bool:
         gap = self._clearance.gap
-        return all(gap(_vec6([u + k / 4 * (v - u) for u, v in zip(a, b, strict=True)])) >= margin for k in (4, 3, 2, 1))
+        return all(gap(vec6([u + k / 4 * (v - u) for u, v in zip(a, b, strict=True)])) >= margin for k in (4, 3, 2, 1))
 
     def _bodies(self, q: Vec6, margin_m: float, far: float) -> Iterator[Wall]:
         """Yield what is near, its room and its slope over the joints."""
@@ -363,7 +364,3 @@ class Approach:
 
 def _length(step: Sequence[float]) -> float:
     return math.sqrt(sum(x * x for x in step))
-
-
-def _vec6(x: Sequence[float]) -> Vec6:
-    return x[0], x[1], x[2], x[3], x[4], x[5]

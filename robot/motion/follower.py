@@ -5,7 +5,7 @@ from operator import le
 
 from config.arm import ArmConfig
 from robot.envelope import Envelope
-from robot.geometry import between, turn_about_vertical, unwound
+from robot.geometry import between, turn_about_vertical, unwound, vec6
 from robot.kinematics import Kinematics, UnreachableError
 from robot.messages import Vec3, Vec6
 from robot.motion.ahead import Ahead
@@ -101,7 +101,7 @@ class Follower:
             ),
             tick_s=tick_s,
         )
-        self._joint_step_rad = _vec6([SPEED_SHARE * j.speed_rad_s * tick_s for j in joints])
+        self._joint_step_rad = vec6([SPEED_SHARE * j.speed_rad_s * tick_s for j in joints])
         self._chain_rows, downward = self._kinematics.chain.rows, self._kinematics.downward
         self._reach = None if downward is None else downward.reach
         self._bounds = free_bounds(envelope, self._kinematics.chain, tip_min_m=tip_min_m)
@@ -142,7 +142,7 @@ class Follower:
     @property
     def joint_target_rad(self) -> Vec6:
         """Where the joints will rest, as far as it is known before they get there."""
-        return self.q_rad if self._is_upright else _vec6(self._joints.target)
+        return self.q_rad if self._is_upright else vec6(self._joints.target)
 
     def aim(self, target_m: Vec3, yaw_rad: float) -> bool:
         """Go to a place with the tool pointing down. Returns False where no joints lead there; then nothing changes."""
@@ -205,7 +205,7 @@ class Follower:
             x, y, z, self.yaw_rad = self._tool.brake()
             self.target_m = (x, y, z)
         else:
-            self.target_m = self._kinematics.tcp(_vec6(self._joints.brake()))
+            self.target_m = self._kinematics.tcp(vec6(self._joints.brake()))
 
     def give_way(self, q_rad: Vec6) -> Vec6:
         """Go towards joints in one tick as hard as the limits let, and go on from there; return what to command."""
@@ -219,7 +219,7 @@ class Follower:
     def step(self) -> Vec6:
         """Advance by one tick and return the joints to command."""
         self.trouble = self.held = None
-        q = self._step_tool() if self._is_upright else self._hold_back(_vec6(self._joints.step()))
+        q = self._step_tool() if self._is_upright else self._hold_back(vec6(self._joints.step()))
         if self._tool.is_failed or self._joints.is_failed:
             self.trouble = "brake"
         self._q_earlier_rad, self.q_before_rad, self.q_rad = self.q_before_rad, self.q_rad, q
@@ -261,7 +261,7 @@ class Follower:
             self._take_up_joints()
             self.brake()
             self.trouble = "unreachable"
-            return _vec6(self._joints.step())
+            return vec6(self._joints.step())
 
     def _aim_tool(self, target: list[float]) -> None:
         """Go to a place and a turn, at guarded speed where it is low or leads low.
@@ -326,7 +326,7 @@ class Follower:
         if share < 1.0:
             self.held = name, 1.0 - share
             self._is_fenced = self._is_fenced or name in self._fence_names
-            q = _vec6([n + (b + share * (w - b)) for n, w, b in zip(now, wanted, base, strict=True)])
+            q = vec6([n + (b + share * (w - b)) for n, w, b in zip(now, wanted, base, strict=True)])
             points = chain.points(q)
             self._go_on(q, points[0][0], is_braking_kept=not is_pushed)
         commands.add(q, points)
@@ -386,7 +386,7 @@ class Follower:
 
     def _align(self, target_m: Vec3, yaw_rad: float) -> bool:
         """Bring the tool upright on the way to a place, by a bounded change of the joints."""
-        now = _vec6(self._joints.target)
+        now = vec6(self._joints.target)
         try:
             q = self._kinematics.solve(target_m, now, yaw_rad=yaw_rad)
         except UnreachableError:
@@ -395,7 +395,3 @@ class Follower:
         self.aim_joints(between(now, q, min(1.0, ALIGN_STEP_RAD / largest)) if largest > 0.0 else q)
         self.yaw_rad = yaw_rad
         return True
-
-
-def _vec6(x: list[float]) -> Vec6:
-    return x[0], x[1], x[2], x[3], x[4], x[5]

@@ -1,6 +1,5 @@
 """One process that the supervisor started, its words led into the logs. The edge."""
 
-import ctypes
 import os
 import signal
 import subprocess
@@ -8,22 +7,20 @@ import sys
 from contextlib import suppress
 from threading import Thread
 
+from robot.parent import end_with_parent
 from robot.up.logs import Logs
 from robot.up.plan import NodePlan
 
 __all__ = ["Child"]
 
-PDEATHSIG = 1
-_libc = ctypes.CDLL(None, use_errno=True)
 
-
-def _end_with_parent() -> None:
-    """Ask the kernel to end this process politely when its supervisor is gone, killed or not.
+def _end_with_supervisor() -> None:
+    """Have this process ended politely when its supervisor is gone.
 
     Ctrl-C means something to it too, though a shell started its supervisor in the background, deaf to that.
     """
     signal.signal(signal.SIGINT, signal.default_int_handler)
-    _libc.prctl(PDEATHSIG, signal.SIGTERM)
+    end_with_parent(signal.SIGTERM)
 
 
 class Child:
@@ -39,7 +36,7 @@ class Child:
         self._process = subprocess.Popen(
             [sys.executable, "-c", "from robot.cli import main; main()", *plan.words],
             stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, start_new_session=True,
-            preexec_fn=_end_with_parent, text=True, encoding="utf-8", errors="replace",
+            preexec_fn=_end_with_supervisor, text=True, encoding="utf-8", errors="replace",
             env=os.environ | {"PYTHONUNBUFFERED": "1"},
         )  # fmt: skip
         self.last_line = ""

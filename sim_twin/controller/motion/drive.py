@@ -4,9 +4,9 @@ from collections import deque
 from collections.abc import Sequence
 from operator import is_
 
-import mujoco
 import numpy as np
 
+from sim_twin.controller.motion.actuation import BRAKE_NM, BRAKE_SOLIMP, HOLD_NM, servo_lag_s
 from sim_twin.controller.motion.contact import ContactWatch
 from sim_twin.controller.motion.core import MotionCore
 from sim_twin.controller.motion.feeling import Feeling
@@ -34,29 +34,14 @@ from sim_twin.controller.motion.wrench import (
 from sim_twin.controller.states import MotionOrder
 from sim_twin.plant import TwinWorld
 
-__all__ = ["TwinDrive", "servo_lag_s"]
+__all__ = ["TwinDrive"]
 
-BRAKE_NM = np.array([60.0, 35.0, 20.5, 6.0, 6.0, 6.0])
-"""Torque of brakes that stop a moving arm: with the twin's own tool its distances are those that UR publishes for the
-CB3 UR5's category 0 stop (see stopping.STOP_RAD_S2)."""
-HOLD_NM = np.array([150.0, 150.0, 150.0, 28.0, 28.0, 28.0])
-"""Torque of brakes that hold a standing one."""
 HELD_RAD_S = 0.005
 ASKED_RAD_S, STILL_RAD_S = 1e-6, 0.01
 """Slower than both a set-point and the joints stand."""
-BRAKE_SOLIMP = (0.9999, 0.9999)
-"""A brake that hardly creeps; MuJoCo's own friction gives way in proportion to the load."""
 N_HISTORY = 1000
 MOST_TOLD_KG, MOST_TOLD_M = 100.0, 10.0
 """Numbers beyond these are a slip, and great ones would overflow to a force that no limit compares with."""
-
-
-def servo_lag_s(model: mujoco.MjModel, actuator: int, *, tick_s: float) -> float:
-    """Return how far a joint of the twin trails a ramp of set-points: damping over stiffness, delay, half a tick."""
-    stiffness, damping = -float(model.actuator_biasprm[actuator, 1]), -float(model.actuator_biasprm[actuator, 2])
-    return damping / stiffness + float(model.actuator_delay[actuator]) + tick_s / 2.0
-
-
 MOST_EXTRA_KG = 20.0
 GIVE_WAY_S = 0.25
 """For as long as a stop takes a collision leads the joints; after that they hold against whatever presses."""
