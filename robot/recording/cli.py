@@ -8,6 +8,7 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
+from robot.errors import RobotConfigError
 from robot.recording.checking import check as check_session
 from robot.recording.checking import lines
 from robot.recording.cutting import cut as cut_session
@@ -25,12 +26,17 @@ __all__ = ["app"]
 EXIT_FAILED = 1
 REPLAYERS = {"learning": "learning.replaying:replay_session", "twin": "robot.recording.replay_to_arm:replay_to_arm"}
 """Who replays a session; learning is not known here."""
+EXPORTERS = {
+    "lerobot": "robot.recording.exporting.lerobot:export_lerobot",
+    "minari": "robot.recording.exporting.minari_set:export_minari",
+}
+"""Loaded when asked for: they bring libraries of their own."""
 MOST_LOST = 10
 
 app = typer.Typer(
     no_args_is_help=True,
     pretty_exceptions_enable=False,
-    help="Recorded sessions: look at them, check, recover, cut, merge, replay, draw.",
+    help="Recorded sessions: look at them, check, recover, cut, merge, export, replay, draw.",
 )
 Session = Annotated[Path, typer.Argument(help="A session's file.")]
 Out = Annotated[Path, typer.Option("--out", "-o", help="The new file; nothing is overwritten.")]
@@ -80,6 +86,27 @@ def check(session: Session, *, json: Json = False) -> None:
             typer.echo(line)
     if not checked.is_sound:
         raise typer.Exit(EXIT_FAILED)
+
+
+@app.command()
+def export(
+    sessions: Annotated[list[Path], typer.Argument(help="Sessions' files, into one data set.")],
+    out: Annotated[Path, typer.Option("--out", "-o", help="Its folder; nothing is overwritten.")],
+    *,
+    to: Annotated[str, typer.Option(help="lerobot (LeRobotDataset v3.0) or minari.")] = "lerobot",
+) -> None:
+    """Write sessions as a data set that others' learners read: `pip install autotelic[export]`."""
+    if to not in EXPORTERS:
+        raise typer.BadParameter(f"expected {' or '.join(EXPORTERS)}, came {to!r}", param_hint="--to")
+    from robot.recording.exporting import courses_of
+
+    try:
+        exporter = load(EXPORTERS[to])
+    except RobotConfigError as error:
+        raise RobotConfigError(
+            f"--to {to}: expected its libraries, `pip install autotelic[export]` brings them: {error.__cause__}"
+        ) from error
+    typer.echo(f"{out}: {exporter(courses_of(sessions), out)}")
 
 
 @app.command()
