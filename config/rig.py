@@ -50,6 +50,8 @@ class NodeStart(Section, frozen=True, kw_only=True):
     whose end is the end of all, or what the arm can do without: that is started again while the arm goes on."""
     command: Annotated[tuple[str, ...], Meta(min_length=1)]
     """Words of an `autotelic` command; {rig}, {scenario}, {address}, {bus}, {keys}, {cell} and {out} are filled in."""
+    is_by_hand: bool = False
+    """A person starts it, in a terminal of its own: it asks things there. `autotelic up` says which command that is."""
 
 
 class Rig(Section, frozen=True, kw_only=True):

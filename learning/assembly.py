@@ -1,7 +1,6 @@
 """From a resolved config to a learner: an agent of the config's layers, and the rig's station to act through."""
 
 from functools import partial
-from pathlib import Path
 
 import torch
 
@@ -16,9 +15,9 @@ from learning.stops import Stops, stops_of
 from learning.stopwatch import Stopwatch
 from learning.subgoal_selector import make_subgoal_selector
 from robot.messages import ArmState, PlantIdentity, StationSpec
-from robot.operated import OperatedStation
+from robot.operated import OperatedStation, operator_of
 from robot.recording.bus_account import BusAccount
-from robot.rigs import build_operator, find_station
+from robot.rigs import find_station
 from robot.station_doors import Accountable
 from robot.tick_tap import TickTap
 
@@ -34,7 +33,6 @@ class RobotLearner:
         *,
         seed: int,
         stopwatch: Stopwatch | None = None,
-        pictures: Path = Path("resets"),
         tap: TickTap | None = None,
     ) -> None:
         """Build plant and station, arm it where nobody has to be there for that, and build the agent.
@@ -43,15 +41,14 @@ class RobotLearner:
             resolved: everything a run is made of.
             seed: root seed of the run.
             stopwatch: hears of every layer's time; None measures nothing.
-            pictures: folder for what a person who lays the table out needs to see.
             tap: hears of every tick, where the arm is held in this process.
         """
         # One small network at a time: more threads cost more than they bring, and the number would change the sums.
         torch.set_num_threads(1)
         lap = None if stopwatch is None else stopwatch.lap
-        station = find_station(resolved, heard_by=lap, pictures=pictures, tap=tap)
+        station = find_station(resolved, heard_by=lap, tap=tap)
         self._local = station
-        self.station = OperatedStation(station, build_operator(resolved.rig))
+        self.station = OperatedStation(station, operator_of(station, resolved.rig))
         self.station.connect()
         self.identity: PlantIdentity = station.identity
         self.model_sha256: str | None = station.model_sha256

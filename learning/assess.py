@@ -101,7 +101,7 @@ def assess(
         recording = open_recording(
             record, folder, resolved, seed=tests[0].root_seed, state=state, purpose=Purpose.TEST
         )  # fmt: skip
-    learner, station = _recorded_learner(folder, resolved, manifest, recording)
+    learner, station = _recorded_learner(resolved, manifest, recording)
     try:
         with taking_up():
             learner.agent.load_state_dict(state["agent"])
@@ -125,11 +125,11 @@ def assess(
 
 
 def _recorded_learner(
-    folder: RunFolder, resolved: Resolved, manifest: Manifest, recording: Recording | None
+    resolved: Resolved, manifest: Manifest, recording: Recording | None
 ) -> tuple[RobotLearner, Station]:
     """Return a learner and the station that it is tested on, recorded where that is wanted."""
     tap = None if recording is None else recording.ticks
-    learner = RobotLearner(resolved, seed=manifest.seed, pictures=folder.path / "resets", tap=tap)
+    learner = RobotLearner(resolved, seed=manifest.seed, tap=tap)
     if recording is None:
         return learner, learner.station
     learner.agent.witness = RecordedDecisions(recording, [goal.name for goal in manifest.goals])

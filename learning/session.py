@@ -248,7 +248,7 @@ def _assemble(
     recording = None if record is None else open_recording(record, folder, resolved, seed=seed, state=state)
     try:
         learner = RobotLearner(
-            resolved, seed=seed, stopwatch=stopwatch, pictures=folder.path / "resets",
+            resolved, seed=seed, stopwatch=stopwatch,
             tap=None if recording is None else recording.ticks,
         )  # fmt: skip
     except BaseException:

@@ -202,6 +202,10 @@ class LocalStation:
         """Say that who has the lease is still there; one that has ended stays so."""
         self._tenure.renew()
 
+    def keep_lease(self) -> None:
+        """Say that who has the lease was heard while nobody could look: one that has run out meanwhile goes on."""
+        self._tenure.keep()
+
     def let_go(self) -> None:
         """Let go of the lease: the arm is stopped and disarmed; a latch stays."""
         was_engaged = self._arming.is_engaged

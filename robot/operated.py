@@ -11,12 +11,16 @@ from time import sleep
 from types import TracebackType
 from typing import Protocol
 
+from config.rig import Rig
 from robot.errors import NotEngagedError, RobotConfigError, RobotError, WireError
+from robot.local_station import LocalStation
 from robot.messages import Intent, Percept, StationMode, StationSpec, StationState, StepResult
+from robot.person import PersonOperator
+from robot.rigs import build_operator
 from robot.safety import Armable, Operator, TooManyLatchesError
 from robot.station import Station
 
-__all__ = ["OperatedStation"]
+__all__ = ["AskingOperator", "OperatedStation", "operator_of"]
 
 MOST_FAILED, PAUSE_S = 5, 1.0
 """So often in a row a wire may fail while nothing is engaged that could latch; so long is waited before each try."""
@@ -29,6 +33,34 @@ class _ArmableStation(Station, Armable, Protocol):
     def n_latches(self) -> int:
         """How often it has latched."""
         ...
+
+
+class AskingOperator:
+    """Implements Operator by asking whoever holds the arm: there a person is asked in turn, and here nobody is."""
+
+    name = "whoever has the lease"
+
+    def arm_once(self, station: Armable) -> None:
+        """Ask for a disarmed station to be armed, and engage it."""
+        station.arm(by=self.name)
+        station.engage()
+
+    def rearm(self, station: Armable, *, seed: int, epoch: int) -> None:
+        """After a latch: ask for the table to be laid out anew and for the latch to be cleared, and engage.
+
+        Raises:
+            TooManyLatchesError: the run has latched too often.
+        """
+        station.reset_plant(seed=seed, epoch=epoch)
+        station.clear_latch(by=self.name)
+        station.engage()
+
+
+def operator_of(station: Armable, rig: Rig) -> Operator | None:
+    """Return who arms a station: the rig's operator, asked where the arm is held if that is another process."""
+    operator = build_operator(rig)
+    is_elsewhere = isinstance(operator, PersonOperator) and not isinstance(station, LocalStation)
+    return AskingOperator() if is_elsewhere else operator
 
 
 class OperatedStation:

@@ -1,6 +1,9 @@
 """A person at the terminal: is told things, presses Enter, and arms an arm that nobody else may. The edge."""
 
+import os
+import select
 import sys
+import termios
 from collections.abc import Callable
 from time import sleep
 from typing import Protocol
@@ -16,6 +19,8 @@ __all__ = ["Person", "PersonOperator", "TerminalPerson"]
 
 LOOK_S = 0.01
 """How long between two looks at the arming button."""
+KEY_S = 0.02
+"""How long between two looks at the keyboard, where there is something to do meanwhile."""
 
 
 class Person(Protocol):
@@ -35,7 +40,15 @@ class Person(Protocol):
 
 
 class TerminalPerson:
-    """Implements Person on standard error and standard input."""
+    """Implements Person on standard error and standard input.
+
+    Args:
+        meanwhile: called again and again while the person is waited for; what it raises ends the waiting. Only what is
+            typed after a question answers it then.
+    """
+
+    def __init__(self, meanwhile: Callable[[], object] | None = None) -> None:
+        self._meanwhile = meanwhile
 
     def tell(self, text: str) -> None:
         """Print a line."""
@@ -47,6 +60,7 @@ class TerminalPerson:
         Raises:
             SafetyError: the input has ended.
         """
+        self._forget_typed()
         typer.echo(f"{text}; then Enter: ", err=True)
         self._line("key")
 
@@ -56,17 +70,39 @@ class TerminalPerson:
         Raises:
             SafetyError: the input has ended.
         """
+        self._forget_typed()
         typer.echo(f"{text}, then Enter: ", err=True)
         return self._line("word")
 
-    @staticmethod
-    def _line(what: str) -> str:
-        line = sys.stdin.readline()
+    def _line(self, what: str) -> str:
+        line = sys.stdin.readline() if self._meanwhile is None else self._awaited(self._meanwhile)
         if not line:
             raise SafetyError(
                 f"expected a person's {what}, the input has ended: nobody is at the arm, it stays disarmed"
             )
         return line.strip()
+
+    def _awaited(self, meanwhile: Callable[[], object]) -> str:
+        """Return the next line that is typed, empty where none can come any more."""
+        keyboard, typed = sys.stdin.fileno(), b""
+        while b"\n" not in typed:
+            meanwhile()
+            if select.select([keyboard], [], [], KEY_S)[0]:
+                came = os.read(keyboard, 4096)
+                if not came:
+                    return ""
+                typed += came
+        return typed.partition(b"\n")[0].decode(errors="replace") + "\n"
+
+    def _forget_typed(self) -> None:
+        """Forget what was typed before a question: it answered another one, which may be void by now."""
+        if self._meanwhile is None:
+            return
+        keyboard = sys.stdin.fileno()
+        if os.isatty(keyboard):
+            termios.tcflush(keyboard, termios.TCIFLUSH)
+        while select.select([keyboard], [], [], 0.0)[0] and os.read(keyboard, 4096):
+            pass
 
 
 class PersonOperator:
@@ -87,13 +123,17 @@ class PersonOperator:
 
     def arm_once(self, station: Armable) -> None:
         """Arm and engage a disarmed station when the person says so, and answers what the cell shows."""
+        self.arm(station)
+        station.engage()
+
+    def arm(self, station: Armable) -> None:
+        """Arm a disarmed station when the person says so, and answers what the cell shows."""
         identity = station.identity
         self._person.await_key(
             f"the {identity.kind.value} arm {identity.serial} will be taken and may move from now on: stand clear, "
             "hand on the emergency stop"
         )
         station.arm(by=self.name, answer=self._answer(station))
-        station.engage()
 
     def rearm(self, station: Armable, *, seed: int, epoch: int) -> None:
         """After a latch: let the person look, lay the table out, and clear the latch when the cell's code is answered.
@@ -102,6 +142,13 @@ class PersonOperator:
             SafetyError: the station is not latched, nobody is there, or the answer is wrong or late.
             TooManyLatchesError: the run has latched too often.
         """
+        self.look(station)
+        station.reset_plant(seed=seed, epoch=epoch)
+        self.clear(station)
+        station.engage()
+
+    def look(self, station: Armable) -> None:
+        """Let the person find out why a station latched, and see to it. Raises SafetyError where it has not."""
         state = station.state
         if state.mode is not StationMode.LATCHED:
             raise SafetyError(f"expected a latched station, it is {state.mode}: nothing to clear")
@@ -109,10 +156,11 @@ class PersonOperator:
             f"the arm was stopped ({state.reason}): find out why, unlock a protective stop at the pendant, lead "
             "the arm clear of the table by hand"
         )
-        station.reset_plant(seed=seed, epoch=epoch)
+
+    def clear(self, station: Armable) -> None:
+        """Clear a latch when the person answers what the cell shows; the arm is still nobody's after it."""
         station.clear_latch(by=self.name, answer=self._answer(station))
         self._person.await_key("the latch is cleared; the arm is taken again next: stand clear")
-        station.engage()
 
     def _answer(self, station: Armable) -> Answer:
         """Let the cell ask, and the person answer. A console shows the code itself only where nothing else can."""

@@ -7,6 +7,7 @@ from typing import Protocol
 import numpy as np
 
 from config.scenario import Scenario
+from robot.errors import WireError
 from robot.hal.protocols import SceneTruth
 from robot.layout import Layout, draw_layout
 from robot.messages import SceneState
@@ -54,7 +55,6 @@ class PersonResetter:
 
         Raises:
             SafetyError: nobody is there any more.
-            StaleStateError: nothing is perceived.
         """
         del digital_out  # lamps and lids follow the cell's program as soon as the arm is taken again
         self._loop.stop()
@@ -67,13 +67,20 @@ class PersonResetter:
         request = f"the arm is disarmed; lay the table out for epoch {epoch}, seed {seed}, as in {path}"
         while True:
             self._person.await_key(request)
-            off = misplaced(layout, self._scene.read())
+            off = self._off(layout)
             if not off:
                 break
             for line in off:
                 self._person.tell(f"not in place: {line}")
             request = "put right what is not in place"
         self._person.await_key("everything is in place; take your hands off the table, the arm moves next")
+
+    def _off(self, layout: Layout) -> list[str]:
+        """Return in words what is not in place; a table that nobody sees is none."""
+        try:
+            return misplaced(layout, self._scene.read())
+        except WireError as error:
+            return [f"nothing is perceived: {error}"]
 
 
 class PersonLook:

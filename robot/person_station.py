@@ -1,6 +1,7 @@
 """A station whose table a person lays out: the arm parks before, and goes to the drawn start after, slowly."""
 
 import math
+from collections.abc import Callable
 
 from robot.errors import SafetyError
 from robot.local_station import LocalStation
@@ -18,12 +19,14 @@ MOST_S = 60.0
 class PersonResetStation(LocalStation):
     """A LocalStation whose resets begin and end with slow moves, through motion and gate like any other.
 
-    Made by robot.lab; `prepare` tells what a person's reset needs.
+    Made by robot.node.lab_node; `prepare` tells what a person's reset needs.
     """
 
-    def prepare(self, resetter: PersonResetter, home_rad: Vec6) -> None:
-        """Store who resets, and where the arm waits meanwhile."""
-        self._by_person, self._home_rad = resetter, home_rad
+    def prepare(
+        self, resetter: PersonResetter, home_rad: Vec6, *, meanwhile: Callable[[], object] = lambda: None
+    ) -> None:
+        """Store who resets, where the arm waits meanwhile, and what is called before each step of its way."""
+        self._by_person, self._home_rad, self._meanwhile = resetter, home_rad, meanwhile
 
     def reset(self, *, seed: int, epoch: int) -> Percept:
         """Park, let a person lay the table out, and go to the epoch's start.
@@ -77,6 +80,7 @@ class PersonResetStation(LocalStation):
         raise SafetyError("start: expected the tool at the drawn start within a minute, it is not: look what holds it")
 
     def _carry_out(self, intent: Intent) -> StepResult:
+        self._meanwhile()
         result = self.step(intent)
         if result.verdicts:
             verdict = result.verdicts[0]

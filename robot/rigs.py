@@ -3,7 +3,6 @@
 import inspect
 from collections.abc import Callable
 from importlib import import_module
-from pathlib import Path
 from time import monotonic_ns
 from typing import TYPE_CHECKING, Any
 
@@ -70,7 +69,6 @@ def build_station(
     *,
     plant: Plant | None = None,
     heard_by: Callable[[str], None] | None = None,
-    pictures: Path = Path("resets"),
     is_driven: bool = False,
     cell_shows: Callable[[str], None] | None = None,
     host_ns: Callable[[], int] = monotonic_ns,
@@ -81,7 +79,6 @@ def build_station(
     Args:
         resolved: Rig, arm, scenario and rule sets.
         plant: One that is already made, in place of the rig's.
-        pictures: Folder for what a person who lays the table out needs to see.
         heard_by: A stopwatch's lap that hears of every tick, where the arm is held in this process.
         is_driven: A person drives: the hand does what it is asked and nothing by itself, and a rig without a perception
             is good enough.
@@ -94,7 +91,7 @@ def build_station(
     perception = _perception_of(resolved, is_driven=is_driven)
     if rig.bus is not None and plant is None:
         return load("robot.lab:build_lab_station")(
-            resolved, perception, pictures=pictures, is_driven=is_driven
+            resolved, perception, is_driven=is_driven
         )  # brings the bus, which lock-step never needs
     world = build_plant(rig=rig, arm=arm, scenario=scenario, cell=resolved.cell) if plant is None else plant
     if heard_by is not None:
@@ -117,22 +114,21 @@ def find_station(
     resolved: Resolved,
     *,
     heard_by: Callable[[str], None] | None = None,
-    pictures: Path = Path("resets"),
     is_driven: bool = False,
     tap: TickTap | None = None,
 ) -> "LocalStation | RemoteStation":
     """Return the station of a rig: of the robot node on its bus where there is one, else one of this process's own.
 
-    Where a person lays the table out it is this process's own, whose terminal he sits at. Ticks
-    are tapped in an own one only.
+    Where a person drives, and lays the table out too, it is this process's own, whose terminal he sits at. Ticks are
+    tapped in an own one only.
     """
     rig = resolved.rig
     check_usable(rig)
-    if rig.bus is not None and rig.reset == "twin":
+    if rig.bus is not None and not (is_driven and rig.reset == "person"):
         found = load("robot.lab:join_robot_node")(resolved, is_driven=is_driven)
         if found is not None:
             return found
-    return build_station(resolved, heard_by=heard_by, pictures=pictures, is_driven=is_driven, tap=tap)
+    return build_station(resolved, heard_by=heard_by, is_driven=is_driven, tap=tap)
 
 
 def build_perception(resolved: Resolved) -> Perceives:
@@ -188,8 +184,8 @@ def check_learnable(rig: Rig) -> None:
 def _require_perception(rig: Rig) -> str:
     if rig.perception is None:
         raise RobotConfigError(
-            f"rig {rig.name}: expected a perception, it has none: no driver of a real camera is there yet, and without "
-            "percepts nothing can be learnt on a real arm. Nothing was connected to, nothing moves"
+            f"rig {rig.name}: expected a perception, it has none, and without percepts nothing is learnt: by camera "
+            "(`perception.from_camera:CameraPerception`, docs/lab.md). Nothing was connected to, nothing moves"
         )
     return rig.perception
 

@@ -101,7 +101,8 @@ def _why_no_link(endpoint: Endpoint) -> str:
     if came in (errno.ECONNREFUSED, errno.ENOENT):
         return (
             f"bus: expected a hub at {endpoint.text}, nobody listens there: start the process that is the hub first "
-            "(for virtual_lab `autotelic controller --bus ...`), or mend the endpoint in the rig's file"
+            "(`autotelic up RIG` starts all of a rig's; `autotelic controller --bus ...` is one), or mend the "
+            "endpoint in the rig's file"
         )
     return f"bus: expected a hub at {endpoint.text}, it cannot be reached: {errno.errorcode.get(came, 'no answer')}"
 

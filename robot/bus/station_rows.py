@@ -163,6 +163,8 @@ class StationTold(msgspec.Struct, frozen=True, kw_only=True):
     card: StationCard | None = None
     lease: str = ""
     """The one that was given."""
+    is_pending: bool = False
+    """A person at the arm is waited for: it is asked for again, under the same number, until it is done."""
     percept: Percept | None = None
     measured: ArmState | None = None
     failed: Failed | None = None

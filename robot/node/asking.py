@@ -11,13 +11,28 @@ from robot import errors
 from robot.bus.errors import BusError
 from robot.bus.queries import Asker
 from robot.bus.session import Bus
-from robot.bus.station_rows import Describe, Failed, LayOut, ResetPlant, StationAsk, StationTold, Work
+from robot.bus.station_rows import (
+    Arm,
+    ClearLatch,
+    Describe,
+    Engage,
+    Failed,
+    LayOut,
+    ResetPlant,
+    StationAsk,
+    StationTold,
+    Work,
+)
 from robot.bus.topics import ASK, LAY_OUT
 from robot.errors import RobotError, WireError
 
 __all__ = ["NodeAsker", "error_of"]
 
 AGAIN_S = 0.3
+_IN_WORDS: dict[type, str] = {
+    Arm: "to arm it", Engage: "to take it", ResetPlant: "to see to it and lay the table out",
+    ClearLatch: "to clear its latch", LayOut: "to lay the table out",
+}  # fmt: skip
 
 
 def error_of(failed: Failed) -> RobotError:
@@ -41,11 +56,15 @@ class NodeAsker:
         bus: open.
         wait_s: for how long.
         pause: waits for so many seconds.
+        tell: told what a person at the arm is waited for.
     """
 
-    def __init__(self, bus: Bus, *, wait_s: float, pause: Callable[[float], object] = sleep) -> None:
+    def __init__(
+        self, bus: Bus, *, wait_s: float, pause: Callable[[float], object] = sleep,
+        tell: Callable[[str], object] = lambda _: None,
+    ) -> None:  # fmt: skip
         self._ask, self._lay_out = bus.asker(ASK), bus.asker(LAY_OUT)
-        self._wait_s, self._pause = wait_s, pause
+        self._wait_s, self._pause, self._tell = wait_s, pause, tell
 
     def is_anybody(self) -> bool:
         """Ask once whether there is a robot node.
@@ -64,12 +83,19 @@ class NodeAsker:
             BusError: nobody answers for so long.
             RobotError: what the robot node raised.
         """
-        told = self._told(StationAsk(work=work, lease=lease, number=number))
+        request = StationAsk(work=work, lease=lease, number=number)
+        told = self._told(request)
+        if told.is_pending:
+            self._tell(f"the robot node waits for a person at the arm: {_IN_WORDS[type(work)]}")
+        while told.is_pending:
+            self._pause(AGAIN_S)
+            told = self._told(request, is_known=True)
         if told.failed is not None:
             raise AnsweredError(error_of(told.failed), told)
         return told
 
-    def _told(self, request: StationAsk) -> StationTold:
+    def _told(self, request: StationAsk, *, is_known: bool = False) -> StationTold:
+        """Ask until somebody answers; once where a second question would be another one to the robot node."""
         asker: Asker[StationAsk, StationTold] = (
             self._lay_out if isinstance(request.work, LayOut | ResetPlant) else self._ask
         )
@@ -79,8 +105,9 @@ class NodeAsker:
             asker.ask_each(request, answers.append)
             if answers:
                 return answers[0]
-            if request.lease or monotonic() > end_s:
-                within = "" if request.lease else f" within {self._wait_s:g} s"
+            is_once = bool(request.lease) and not is_known
+            if is_once or monotonic() > end_s:
+                within = "" if is_once else f" within {self._wait_s:g} s"
                 raise BusError(
                     f"station: expected a robot node that answers{within}, none did; does "
                     "`autotelic up` run, or `autotelic node robot`?"

@@ -23,15 +23,32 @@ def _group() -> None:
 
 
 @app.command()
+def hub(
+    rig: Annotated[str, typer.Option(help="A rig's file, or a shipped rig's name.")] = "virtual_lab",
+    scenario: Annotated[str, typer.Option(help="A shipped scenario's name or a file.")] = "paper",
+) -> None:
+    """Be the hub of a rig's bus until Ctrl-C, where no virtual controller is it."""
+    from robot.node.hub import run_hub  # brings the bus
+
+    resolved = resolve(rig=rig, scenario=scenario)
+    with StopRequest() as end:
+        run_hub(resolved.rig, end=end)
+
+
+@app.command()
 def robot(
     rig: Annotated[str, typer.Option(help="A shipped rig's name or a file.")] = "virtual_lab",
     scenario: Annotated[str, typer.Option(help="A shipped scenario's name or a file.")] = "paper",
+    pictures: Annotated[Path, typer.Option(help="Folder for pictures of what belongs where.")] = Path("resets"),
 ) -> None:
-    """Hold a rig's arm and serve it over the bus until Ctrl-C. Arms nothing by itself."""
+    """Hold a rig's arm and serve it over the bus until Ctrl-C. Arms nothing by itself.
+
+    Where a person arms the arm or lays the table out, that is whoever sits at this command's terminal.
+    """
     from robot.node.lab_node import open_robot_node  # brings the bus and the arm's client
 
     resolved = resolve(rig=rig, scenario=scenario)
-    with StopRequest() as end, open_robot_node(resolved) as node:
+    with StopRequest() as end, open_robot_node(resolved, pictures=pictures) as node:
         typer.echo(f"robot node of {resolved.rig.name}: disarmed, waits for a source at {resolved.rig.bus}", err=True)
         node.run(end)
 

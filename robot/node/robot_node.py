@@ -40,6 +40,7 @@ from robot.bus.topics import ARM_STATE, ASK, INTENT, LAY_OUT, PERCEPT, REPORT, R
 from robot.errors import BugError, NotEngagedError, RobotError, SafetyError
 from robot.messages import ArmState, Percept, StepResult
 from robot.node.admission import Admission
+from robot.node.errand import AtTheArm, Errand, is_errand, is_his
 from robot.node.inbox import Inbox, Refused
 from robot.node.pulse import Pulse
 from robot.node.served import ServedStation
@@ -68,6 +69,8 @@ class RobotNode:
         halt: told of a stop at once, on the bus's thread, for an arm that is held in another process.
         take_notes: returns what ticks of the last time step asked for, thinned.
         is_perceiving: percepts are this process's own, and told by it.
+        is_attended: what is asked for may take as long as a person at the arm needs for it.
+        person: arms this arm, and nobody else does; None where whoever has the lease may, for nothing can be hurt.
         now_ns: this process's monotonic clock.
 
     Attributes:
@@ -78,10 +81,12 @@ class RobotNode:
         self, bus: Bus, station: ServedStation, *, scenario: str, profile: str,
         drive: Callable[[bool], object] = lambda _: None, halt: Callable[[], object] = lambda: None,
         take_notes: Callable[[], tuple[TickNote, ...]] = tuple, is_perceiving: bool = True,
-        now_ns: Callable[[], int] = monotonic_ns,
+        is_attended: bool = False, person: AtTheArm | None = None, now_ns: Callable[[], int] = monotonic_ns,
     ) -> None:  # fmt: skip
         self._station, self._scenario, self._profile = station, scenario, profile
         self._drive, self._take_notes, self._now_ns = drive, take_notes, now_ns
+        self._is_attended, self._person, self._errand = is_attended, person, Errand()
+        self._is_over: Callable[[], bool] = lambda: False
         self.pulse = Pulse(now_ns=now_ns)
         assert INTENT.deadline_s is not None, "an intent grows old"
         self._admission = Admission(max_age_ns=round(INTENT.deadline_s * 1e9), now_ns=now_ns)
@@ -104,6 +109,7 @@ class RobotNode:
 
     def run(self, is_over: Callable[[], bool]) -> None:
         """Serve until told that it is over; the arm is stopped and let go of then."""
+        self._is_over = is_over
         try:
             while not is_over():
                 self._inbox.wait(LOOK_S)
@@ -134,6 +140,27 @@ class RobotNode:
             self._say_refused(refused)
         self._look()
 
+    def tend(self) -> None:
+        """See to what cannot wait while a person at the arm is waited for, or the arm is on its way to and from him.
+
+        Raises:
+            SafetyError: what he is waited for is void: somebody said stop, who asked has gone, or this node ends.
+        """
+        self.pulse.beat()
+        if self._carry_out_stops():
+            raise SafetyError("somebody said stop: what a person at the arm was asked for is void")
+        if self._inbox.has_beat():
+            self._station.keep_lease()
+        for answerer in self._answerers:
+            asked = answerer.next()
+            if asked is not None:
+                asked.answer(self._meanwhile(asked.request))
+        self._tell_report(is_due=self._now_ns() - self._report_ns >= REPORT_NS)
+        if self._is_over():
+            raise SafetyError("this robot node ends: what a person at the arm was asked for is void")
+        if not self._station.lease_number:
+            raise SafetyError("who asked a person at the arm for it has gone: it is void")
+
     @property
     def is_stop_due(self) -> bool:
         """Whether somebody said stop and it waits to be confirmed."""
@@ -151,11 +178,14 @@ class RobotNode:
 
     # ---------------------------------------------------------------------------------------------------------- stop
 
-    def _carry_out_stops(self) -> None:
+    def _carry_out_stops(self) -> bool:
+        """Stop, as often as it was said, and return whether it was."""
         asked = self._inbox.stop()
+        is_any = asked is not None
         while asked is not None:
             self._stop(asked)
             asked = self._inbox.stop()
+        return is_any
 
     def _stop(self, asked: StopAsk) -> None:
         if asked.number in self._stops:
@@ -220,12 +250,34 @@ class RobotNode:
 
     def _answer(self, asked: _Question) -> None:
         request = asked.request
+        if self._errand.is_this(request):
+            asked.answer(self._errand.told(self._report()))
+        elif self._is_attended and is_errand(request) and self._has_turn(request):
+            self._errand.begin(request)
+            asked.answer(self._errand.told(self._report()))
+            self.pulse.doing = f"waits for a person at the arm: {self._errand.what}"
+            self._errand.end(self._outcome(request))
+        else:
+            asked.answer(self._outcome(request))
+
+    def _meanwhile(self, request: StationAsk) -> StationTold:
+        """Return what a question comes to while a person is waited for."""
+        if self._errand.is_this(request):
+            return self._errand.told(self._report())
+        if isinstance(request.work, Describe | Release):
+            return self._outcome(request)
+        busy = SafetyError(f"robot node: it waits for a person at the arm ({self._errand.what}); ask again after that")
+        return StationTold(report=self._report(), failed=_failed(busy))
+
+    def _has_turn(self, request: StationAsk) -> bool:
+        return self._admission.why_no_turn(request.lease, request.number) is None
+
+    def _outcome(self, request: StationAsk) -> StationTold:
         try:
-            told = self._obey(request)
+            return self._obey(request)
         except RobotError as error:
             self.pulse.fail(f"{type(request.work).__name__}: {error}")
-            told = StationTold(report=self._report(), failed=_failed(error))
-        asked.answer(told)
+            return StationTold(report=self._report(), failed=_failed(error))
 
     def _obey(self, request: StationAsk) -> StationTold:
         work = request.work
@@ -243,6 +295,8 @@ class RobotNode:
         station, percept = self._station, None
         if self._is_final and isinstance(work, Arm | Engage | ClearLatch):
             raise SafetyError("to arm it: whoever started this robot node is ending it; start it again")
+        if self._person is not None and is_his(work, station, self._person):
+            return StationTold(report=self._report())
         match work:
             case Arm(by=by):
                 station.arm(by=by)

@@ -29,6 +29,10 @@ class Leased(Protocol):
         """Say that who has the lease is still there; one that has ended stays so."""
         ...
 
+    def keep_lease(self) -> None:
+        """Say that who has the lease was heard while nobody could look: one that has run out meanwhile goes on."""
+        ...
+
     def let_go(self) -> None:
         """Let go of the lease: the arm is stopped and disarmed; a latch stays."""
         ...

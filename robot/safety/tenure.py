@@ -60,6 +60,11 @@ class Tenure:
         if self._lease is not None and self._book.is_in_force(self._lease):
             self._book.renew(self._lease)
 
+    def keep(self) -> None:
+        """Say that the source is there and was all the while; where nobody has the lease that says nothing."""
+        if self._lease is not None:
+            self._book.revive(self._lease)
+
     def holds(self) -> bool:
         """Disarm where what the station was armed for is gone. Returns False where that took motion away just now."""
         was_engaged = self._arming.is_engaged

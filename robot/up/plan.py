@@ -26,6 +26,8 @@ class NodePlan(msgspec.Struct, frozen=True, kw_only=True):
     kind: str
     words: tuple[str, ...]
     """Of the `autotelic` command."""
+    is_by_hand: bool = False
+    """A person starts it, in a terminal of its own."""
 
 
 def plans_of(
@@ -54,7 +56,7 @@ def plans_of(
         raise RobotConfigError(f"--without: expected some of {', '.join(names)}, came {', '.join(sorted(unknown))}")
     return tuple(
         NodePlan(
-            name=node.name, kind=node.kind,
+            name=node.name, kind=node.kind, is_by_hand=node.is_by_hand,
             words=(*(_filled(word, values, node.name) for word in node.command), *(more if node.kind == "job" else ())),
         )
         for node in rig.nodes if node.name not in without

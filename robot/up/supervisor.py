@@ -4,6 +4,7 @@ Nothing is armed here. A process that ended or froze has the arm stopped before 
 was started again is disarmed.
 """
 
+import shlex
 import signal
 from collections.abc import Callable
 from time import monotonic, sleep
@@ -110,6 +111,9 @@ class Supervisor:
 
     def _start_all(self, should_end: Callable[[], bool], look: Callable[[], object]) -> bool:
         for node in self.nodes.values():
+            if node.plan.is_by_hand:
+                self._note(node, f"in a terminal of its own, start: autotelic {shlex.join(node.plan.words)}")
+                continue
             self._start(node)
             end_s = self._now_s() + START_S
             while not self._is_up(node):
@@ -184,7 +188,9 @@ class Supervisor:
     def _look(self) -> None:
         for node in self.nodes.values():
             child = node.child
-            if child is None:
+            if node.plan.is_by_hand:
+                self._listen_by_hand(node)
+            elif child is None:
                 if node.again_s is not None and self._now_s() >= node.again_s:
                     self._start(node)
             elif child.code is not None:
@@ -214,6 +220,16 @@ class Supervisor:
         if self.book.is_silent(name, for_s=GONE_S, hub=self._hub):
             self._note(node, f"silent for {GONE_S:g} s: it is killed")
             child.kill()
+
+    def _listen_by_hand(self, node: _Node) -> None:
+        """Stop the arm where a process that a person started is silent; what ends it is that person's."""
+        is_silent = self.book.is_silent(node.plan.name, for_s=SILENT_S, hub=self._hub)
+        if is_silent and not node.is_silent:
+            self._note(node, f"silent for {SILENT_S:g} s: look at its terminal", Worst.MENDED)
+            self._stop_arm(node)
+        elif node.is_silent and not is_silent and self.book.age_s(node.plan.name) is not None:
+            self._note(node, "heard again")
+        node.is_silent = is_silent
 
     def _ended(self, node: _Node, child: Child) -> None:
         code = node.code = child.code
@@ -248,7 +264,7 @@ class Supervisor:
 
     def _say_stop(self, *, within_s: float, is_final: bool) -> float | None:
         robots = [node for node in self.nodes.values() if node.plan.kind == "robot"]
-        is_there = any(node.child is not None and node.child.code is None for node in robots)
+        is_there = any(self._is_there(node) for node in robots)
         if self._stops is None or not is_there:
             return None
         try:
@@ -258,21 +274,28 @@ class Supervisor:
         self._note(robots[0], f"stop {'not confirmed' if took_s is None else f'confirmed after {1e3 * took_s:.0f} ms'}")
         return took_s
 
+    def _is_there(self, node: _Node) -> bool:
+        if node.plan.is_by_hand:
+            return self.book.age_s(node.plan.name) is not None
+        return node.child is not None and node.child.code is None
+
     # ----------------------------------------------------------------------------------------------------------- end
 
     def _end(self) -> None:
         """The arm first, then who commands it, the arm again, who holds it, and all else backwards."""
         nodes = [node for node in self.nodes.values() if node.child is not None and node.child.code is None]
+        others = [n for n in self.nodes.values() if n.plan.is_by_hand and n.plan.kind == "robot" and self._is_there(n)]
+        is_final = not others  # a robot node that a person started goes on without us
         jobs = [node for node in nodes if node.plan.kind == "job"]
         for node in jobs:
             self._signal(node, signal.SIGINT)
-        self._first_s = self._say_stop(within_s=STOP_S, is_final=True)
+        self._first_s = self._say_stop(within_s=STOP_S, is_final=is_final)
         for node in jobs:
             self._await(node, JOB_S)
         robots = [node for node in nodes if node.plan.kind == "robot"]
-        self._last_s = self._say_stop(within_s=STOP_S, is_final=True)
-        if robots and None in (self._first_s, self._last_s):
-            self._note(robots[0], "its stop was not confirmed: look at the arm", Worst.FAILED)
+        self._last_s = self._say_stop(within_s=STOP_S, is_final=is_final)
+        if (robots or others) and None in (self._first_s, self._last_s):
+            self._note((*robots, *others)[0], "its stop was not confirmed: look at the arm", Worst.FAILED)
         rest = [node for node in reversed(nodes) if node not in jobs and node not in robots]
         for node in (*robots, *rest):
             self._signal(node, signal.SIGINT)

@@ -23,7 +23,7 @@ class Heard(msgspec.Struct, kw_only=True):
     heard_s: float | None = None
     """When it was heard last; None since it was started (again) and not heard yet."""
     pid: int = 0
-    """Of the process that was started; the word of another of that name is not its word."""
+    """Of the process that was started; the word of another of that name is not its word. 0 where a person starts it."""
     is_leaving: bool = False
     """It said so, and is silent since."""
     is_same_clock: bool = True
@@ -59,7 +59,7 @@ class HealthBook:
         """Take a word in. Called on the bus's thread."""
         heard = self._by_name.get(received.envelope.source)
         health = received.message
-        if heard is None or health.pid != heard.pid:
+        if heard is None or (heard.pid and health.pid != heard.pid):
             return
         heard.first_mb = heard.first_mb or health.rss_mb
         heard.most_late_ms = max(heard.most_late_ms, health.late_ms)

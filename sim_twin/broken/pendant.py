@@ -5,7 +5,7 @@ from collections.abc import Callable
 from time import monotonic, sleep
 
 from sim_twin.controller.process import ask_fault
-from sim_twin.controller.wire.wires import DASHBOARD
+from sim_twin.controller.wire.wires import DASHBOARD, SCRIPTS
 
 __all__ = ["Pendant"]
 
@@ -32,6 +32,12 @@ class Pendant:
                 connection.sendall(line.encode() + b"\n")
                 answers.append(heard.readline().decode().strip())
             return answers
+
+    def run(self, script: str) -> None:
+        """Have the controller run a script, as anybody may who reaches its port."""
+        with socket.create_connection((self.host, SCRIPTS), timeout=ANSWER_S) as connection:
+            connection.sendall(script.encode())
+            connection.recv(64)  # it was read, with the state that the port gives everybody
 
     def unlock(self) -> None:
         """Release a protective stop, as soon as the controller lets a person do it: 5 s of its own time."""

@@ -136,6 +136,21 @@ def _power_up(stage: Stage) -> None:
     stage.pendant.power_up()
 
 
+def _running(script: str) -> Callable[[Stage], float]:
+    """Have somebody else's script run."""
+
+    def bring(stage: Stage) -> float:
+        at_s = monotonic()
+        stage.pendant.run(script)
+        return at_s
+
+    return bring
+
+
+def _end_program(stage: Stage) -> None:
+    stage.pendant.say("stop")
+
+
 def _restart(stage: Stage) -> None:
     stage.pendant.restart()
 
@@ -148,6 +163,9 @@ def _short_freeze(stage: Stage) -> float:
     return at_s
 
 
+_OTHER = "def other():\n while True:\n  sync()\n end\nend\n"
+_TOOL = "sec tool():\n set_tcp(p[0, 0, 0.4, 0, 0, 0])\nend\n"
+_LOAD = "sec load():\n set_payload(3.0, [0, 0, 0.05])\nend\n"
 _REGISTERS = ["input_int_register_0"]
 _BIAS_RAD = (0.02, 0.0, 0.0, 0.0, 0.0, 0.0)
 TRIALS: tuple[Trial, ...] = (
@@ -195,6 +213,9 @@ TRIALS: tuple[Trial, ...] = (
     Trial(name="safety_violation", begin=_by("violation"), person=_restart, bars=True),
     Trial(name="controller_fault", begin=_by("fault"), person=_restart, bars=True),
     Trial(name="program_stopped", begin=_by("program_stop")),
+    Trial(name="program_replaced", begin=_running(_OTHER), end=_end_program, bars=True),
+    Trial(name="tool_set_by_another", begin=_running(_TOOL), begins_s=TOLD_S),  # the port that tells does so at 10 Hz
+    Trial(name="payload_set_by_another", begin=_running(_LOAD)),
     Trial(name="gripper_dropped", begin=_by("drop", port=GRIPPER), begins_s=TOLD_S),
     Trial(
         name="gripper_silent", begin=_by("freeze", on=True, port=GRIPPER), end=_by("freeze", on=False, port=GRIPPER),

@@ -94,18 +94,15 @@ def test_the_cell_travels_with_the_rig_and_is_stored_with_the_run(tmp_path):
     assert check_file(write(tmp_path, "cell.yaml", shipped_tree("cells", "ur_box"))) is Kind.CELL
 
 
-def test_lab_is_virtual_lab_with_another_address_and_serial_and_what_a_real_arm_lacks():
-    virtual, lab = shipped_tree("rigs", "virtual_lab"), shipped_tree("rigs", "lab")
+def test_lab_is_virtual_lab_camera_with_another_address_and_serial_a_real_camera_and_a_person():
+    virtual, lab = shipped_tree("rigs", "virtual_lab_camera"), shipped_tree("rigs", "lab")
     assert load_rig("lab").address is None
     differing = {key for key in virtual.keys() | lab.keys() if virtual.get(key) != lab.get(key)}
-    assert differing == {
-        "name",
-        "description",
-        "address",
-        "bus",
-        "nodes",
-        "expected",
-        "perception",
-        "operator",
-        "reset",
+    assert differing == {"name", "description", "address", "bus", "nodes", "expected", "camera", "operator", "reset"}
+    same = {
+        node["name"]: (node.get("kind"), node["command"][:2]) for node in virtual["nodes"] if node["name"] != "twin"
     }
+    assert {node["name"]: (node.get("kind"), node["command"][:2]) for node in lab["nodes"]} == same | {
+        "hub": ("hub", ["node", "hub"])
+    }
+    assert [node["name"] for node in lab["nodes"] if node.get("is_by_hand")] == ["robot", "learning"]

@@ -50,9 +50,9 @@ def test_a_lab_that_is_not_filled_in_is_one_error_that_says_what_to_do(tmp_path,
         assert words in text
 
 
-def test_learning_on_a_real_arm_ends_before_anything_is_connected_to_as_there_is_no_camera_yet(tmp_path, monkeypatch):
+def test_learning_where_nothing_perceives_ends_before_anything_is_connected_to(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    code, text = said("learn", "--rig", filled(tmp_path), "--out", "run")
+    code, text = said("learn", "--rig", filled(tmp_path, perception=None), "--out", "run")
     assert code == 2
     assert "perception" in text
     assert "nothing moves" in text

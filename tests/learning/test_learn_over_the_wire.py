@@ -6,6 +6,8 @@ import re
 import signal
 import subprocess
 import time
+from contextlib import contextmanager
+from threading import Event, Thread
 
 import numpy as np
 import pytest
@@ -36,7 +38,7 @@ def lab(tmp_path_factory):
 @pytest.fixture
 def lab_by_person(tmp_path):
     host = "127.0.0.63"
-    make_lab(tmp_path, host, reset="person")
+    make_lab(tmp_path, host, reset="person", operator="robot.person:PersonOperator")
     with controller_of(tmp_path, host) as controller:
         yield tmp_path, controller, host
 
@@ -186,42 +188,129 @@ def test_workers_are_refused_where_there_is_one_arm(lab):
     assert "--workers" in said
 
 
-@pytest.mark.slow
-def test_a_person_lays_the_table_out_while_the_arm_is_parked_and_disarmed(lab_by_person):
-    folder, controller, host = lab_by_person
-    home = np.array(load_arm("ur5e").home_rad)
-    process = start(folder, *learn("run", "--epochs", "1"), stdin=subprocess.PIPE)
+class AtTheArm:
+    """Sits at the robot node's terminal: presses Enter, types codes, and lays the table out when told what is off."""
+
+    def __init__(self, folder, controller, bus):
+        self.folder, self.controller, self.bus = folder, controller, bus
+        self.said, self.parked_rad = [], []
+        self.home = np.array(load_arm("ur5e").home_rad)
+        self.asked = None
+
+    def answer(self, line):
+        """Return what is typed at a line, None at one that asks nothing."""
+        self.said.append(line)
+        code = re.search(r"the code is (\d+)", line)
+        if code:
+            return code[1]
+        if "Enter" not in line:
+            return None
+        asked = re.search(r"epoch (\d+), seed (\d+), as in (\S+);", line)
+        if asked:
+            truth = self.controller.fault("truth")
+            assert truth["runtime"] == "STOPPED", "a person reaches in: nobody may be in command"
+            self.parked_rad.append(np.abs(np.array(truth["q_rad"]) - self.home).max())
+            assert (self.folder / asked[3]).read_bytes()[:4] == b"\x89PNG"
+            self.asked = asked
+        elif "put right" in line:
+            self.bus.asker(RESET).ask(ResetRequest(seed=int(self.asked[2]), epoch=int(self.asked[1]), digital_out=0))
+        return ""
+
+    def attend(self, process):
+        """Answer whatever a process asks, until it ends."""
+        for line in process.stderr:
+            typed = self.answer(line)
+            if typed is not None:
+                process.stdin.write(f"{typed}\n")
+                process.stdin.flush()
+
+
+@contextmanager
+def attended(lab):
+    """Run perception node and robot node, with a person at the latter's terminal."""
+    folder, controller, host = lab
     bus = Bus(f"tcp/{host}:7447", serial=SERIAL, role=Role.LEARNING, source="hand")
     bus.open()
-    said, parked_rad = [], []
-    try:
-        for line in process.stderr:
-            said.append(line)
-            if "Enter" not in line:
-                continue
-            asked = re.search(r"epoch (\d+), seed (\d+), as in (\S+);", line)
-            if asked:
-                truth = controller.fault("truth")
-                assert truth["runtime"] == "STOPPED", "a person reaches in: nobody may be in command"
-                parked_rad.append(np.abs(np.array(truth["q_rad"]) - home).max())
-                assert (folder / asked[3]).read_bytes()[:4] == b"\x89PNG"
-                last = asked
-            elif "put right" in line:
-                bus.asker(RESET).ask(ResetRequest(seed=int(last[2]), epoch=int(last[1]), digital_out=0))
-                time.sleep(0.1)
+    node = ("--rig", "rig.yaml", "--scenario", "small.yaml")
+    person = AtTheArm(folder, controller, bus)
+    with (
+        start(folder, "node", "perception", *node, stdin=subprocess.DEVNULL) as perception,
+        start(folder, "node", "robot", *node, stdin=subprocess.PIPE) as robot,
+    ):
+        attends = Thread(target=person.attend, args=(robot,))
+        attends.start()
+        try:
+            until(lambda: any("waits for a source" in line for line in person.said))
+            yield person, robot
+        finally:
+            for process in (robot, perception):
+                process.send_signal(signal.SIGINT)
+            for process in (robot, perception):
+                process.wait(timeout=20)
+            attends.join()
+            bus.close()
+
+
+@pytest.mark.slow
+def test_a_person_at_the_robot_nodes_terminal_arms_and_lays_the_table_out_while_the_arm_is_parked(lab_by_person):
+    folder, controller, _ = lab_by_person
+    with attended(lab_by_person) as (person, _):
+        code, _, said = autotelic(folder, *learn("run", "--epochs", "1"), timeout_s=240, said="\n")
+    text = "".join(person.said)
+    assert code == 0, said + text
+    assert "robot-hours: at most" in said
+    assert "resets by a person: 3, of which 2 for evaluations" in said
+    assert "the robot node waits for a person at the arm: to arm it" in said
+    assert "the robot node waits for a person at the arm: to lay the table out" in said
+    assert len(re.findall(r"not in place: \w+: \d+ mm off", text)) >= 3
+    assert len(person.parked_rad) == 3
+    assert max(person.parked_rad) < 0.02
+    assert len(list((folder / "resets").glob("*.png"))) == 3
+    assert_at_rest(controller)
+
+
+@pytest.mark.slow
+def test_who_has_died_is_waited_for_no_longer_and_the_next_one_is_asked_for_anew(lab_by_person):
+    folder, controller, _ = lab_by_person
+    with attended(lab_by_person) as (person, _):
+        answer, is_there = person.answer, Event()
+        is_there.set()
+
+        def late(line):
+            typed = answer(line)
+            if "lay the table out" in line:
+                is_there.wait()
+            return typed
+
+        person.answer = late
+        is_there.clear()
+        with start(folder, *learn("died", "--epochs", "1"), stdin=subprocess.PIPE) as process:
             process.stdin.write("\n")
             process.stdin.flush()
-        code = process.wait(timeout=20)
-    finally:
-        process.kill()
-        process.communicate()
-        bus.close()
-    text = "".join(said)
-    assert code == 0, text
-    assert "robot-hours: at most" in text
-    assert "resets by a person: 3, of which 2 for evaluations" in text
-    assert len(re.findall(r"not in place: \w+: \d+ mm off", text)) >= 3
-    assert len(parked_rad) == 3
-    assert max(parked_rad) < 0.02
-    assert len(list((folder / "run" / "resets").glob("*.png"))) == 3
+            until(lambda: any("lay the table out" in line for line in person.said))
+            os.killpg(process.pid, signal.SIGKILL)
+        n = len(person.said)
+        time.sleep(3.0)
+        is_there.set()
+        code, _, said = autotelic(folder, *learn("next", "--epochs", "1"), timeout_s=240, said="\n")
+    assert code == 0, said + "".join(person.said)
+    assert any("stand clear" in line for line in person.said[n:]), "he is asked to arm it for the next one"
     assert_at_rest(controller)
+
+
+@pytest.mark.slow
+def test_without_a_robot_node_nobody_lays_the_table_out_and_it_is_said_what_to_start(lab_by_person):
+    folder, controller, _ = lab_by_person
+    code, _, said = autotelic(folder, *learn("alone", "--epochs", "1"), said="\n")
+    assert (code, said.strip().splitlines()[-1].startswith("error: rig small_lab: expected a robot node")) == (2, True)
+    assert "autotelic node robot" in said
+    assert_at_rest(controller)
+
+
+@pytest.mark.slow
+def test_without_a_hub_it_is_said_what_to_start(tmp_path):
+    make_lab(tmp_path, "127.0.0.64", reset="person", operator="robot.person:PersonOperator")
+    code, _, said = autotelic(tmp_path, *learn("alone", "--epochs", "1"), said="\n")
+    assert code == 1, said
+    assert "expected a hub at" in said.strip().splitlines()[-1]
+    assert "autotelic up" in said

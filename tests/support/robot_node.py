@@ -17,7 +17,7 @@ SERIAL = "4711"
 class Node:
     """A robot node in a thread, over a fake arm in lock-step."""
 
-    def __init__(self, endpoint, *, is_hub=True, served=lambda station: station):
+    def __init__(self, endpoint, *, is_hub=True, served=lambda station: station, person=None):
         rig = fake_rig()
         notes = TickNotes(rate_hz=1.0 / rig.rig.tick_s)
         self.local = build_station(rig, tap=notes)
@@ -32,6 +32,8 @@ class Node:
             drive=self.drive,
             halt=self.halt,
             take_notes=notes.take,
+            is_attended=person is not None,
+            person=person,
         )
         self.hands = {True: AskedHand(rig.arm), False: HandReflexes(arm=rig.arm, scenario=rig.scenario)}
         self.thread = threading.Thread(target=self.node.run, args=(self.is_over.is_set,))

@@ -13,11 +13,13 @@ from sim_twin.controller.wire.rtde_server import InputSink, Outputs, RtdeServer
 from sim_twin.controller.wire.state_ports import SCRIPT_BUDGET, ScriptSink, StatePorts, StateSource
 from sim_twin.controller.wire.version import ControllerVersion
 
-__all__ = ["DASHBOARD", "GRIPPER", "RTDE", "Wires"]
+__all__ = ["DASHBOARD", "GRIPPER", "RTDE", "SCRIPTS", "Wires"]
 
 DASHBOARD = 29999
 RTDE = 30004
 GRIPPER = 63352
+SCRIPTS = 30002
+"""One of those that scripts are taken at."""
 # What one peer can cost in one poll follows from these: some 2 ms at worst, for a flood of the smallest messages.
 _LINES = Budget(bytes_a_poll=256)
 _REGISTERS = Budget(bytes_a_poll=2048)

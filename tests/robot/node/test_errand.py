@@ -1,0 +1,183 @@
+"""What a person at the arm is asked for over the bus: minutes pass, and the node is there for everybody meanwhile."""
+
+import os
+import socket
+import threading
+import time
+from types import SimpleNamespace
+
+import pytest
+
+from robot.bus import Bus, Role
+from robot.errors import SafetyError
+from robot.messages import StationMode
+from robot.node import NodeAsker, RemoteStation, StopCaller
+from robot.operated import AskingOperator
+from robot.person import TerminalPerson
+from robot.safety import Answer
+from tests.support.robot_node import SERIAL, Node
+
+pytestmark = pytest.mark.realtime
+
+HOST = "127.0.0.103"
+
+
+def until(is_true, timeout_s=10.0):
+    end = time.monotonic() + timeout_s
+    while not is_true():
+        assert time.monotonic() < end
+        time.sleep(0.005)
+
+
+class AtTheArm:
+    """Reads for as long as it is told to, and then says yes."""
+
+    def __init__(self):
+        self.agrees, self.asked, self.tend = threading.Event(), [], lambda: None
+
+    def arm(self, station):
+        self._read("arm")
+        station.arm(by="a person")
+
+    def look(self, station):
+        self._read(station.state.reason)
+
+    def clear(self, station):
+        self._read("clear")
+        station.clear_latch(by="a person")
+
+    def _read(self, what):
+        self.asked.append(what)
+        while not self.agrees.is_set():
+            self.tend()
+            time.sleep(0.01)
+
+
+@pytest.fixture
+def lab():
+    with socket.create_server((HOST, 0)) as free:
+        endpoint = f"tcp/{HOST}:{free.getsockname()[1]}"
+    person = AtTheArm()
+    node = Node(endpoint, person=person)
+    person.tend = node.node.tend
+    told, made = [], []
+
+    def join(source="learning"):
+        bus = Bus(endpoint, serial=SERIAL, role=Role.LEARNING, source=source)
+        bus.open()
+        made.append(RemoteStation(bus, asker=NodeAsker(bus, wait_s=5.0, tell=told.append)))
+        return made[-1]
+
+    with Bus(endpoint, serial=SERIAL, role=Role.VIEWER) as viewer:
+        yield SimpleNamespace(person=person, node=node, join=join, told=told, viewer=viewer)
+    person.agrees.set()
+    for station in made:
+        station.close()
+    node.close()
+
+
+def arming(station):
+    """Have it armed by a thread of its own, and return that and what came of it."""
+    came = []
+
+    def run():
+        try:
+            AskingOperator().arm_once(station)
+        except SafetyError as error:
+            came.append(str(error))
+
+    thread = threading.Thread(target=run)
+    thread.start()
+    return thread, came
+
+
+def test_an_arm_is_armed_when_the_person_agrees_however_long_that_takes_and_he_is_asked_once(lab):
+    station = lab.join()
+    thread, came = arming(station)
+    until(lambda: lab.told)
+    time.sleep(2.5)  # longer than a lease lives without a word, and many times asked whether it is done
+    assert lab.node.local.state.mode is StationMode.DISARMED
+    lab.person.agrees.set()
+    thread.join()
+    assert came == []
+    assert (lab.person.asked, station.state.mode) == (["arm"], StationMode.ENGAGED)
+    assert "to arm it" in lab.told[0]
+
+
+def test_meanwhile_others_are_told_what_it_waits_for(lab):
+    thread, _ = arming(lab.join())
+    until(lambda: lab.person.asked)
+    with pytest.raises(SafetyError, match=r"waits for a person at the arm \(Arm\)"):
+        AskingOperator().arm_once(lab.join("other"))
+    lab.person.agrees.set()
+    thread.join()
+
+
+def test_a_stop_voids_it_whatever_the_person_says_afterwards(lab):
+    thread, came = arming(lab.join())
+    until(lambda: lab.person.asked)
+    caller = StopCaller(lab.viewer, by="the test")
+    assert caller.stop(within_s=5.0) is not None
+    caller.close()
+    thread.join()
+    assert "somebody said stop" in came[0]
+    lab.person.agrees.set()
+    assert lab.node.local.state.mode is StationMode.DISARMED
+
+
+def test_who_asked_and_has_gone_is_waited_for_no_longer(lab):
+    station = lab.join()
+    thread, came = arming(station)
+    until(lambda: lab.person.asked)
+    station._is_over.set()  # its heart stops, as that of a process that was killed does
+    thread.join()
+    assert "has gone" in came[0]
+    assert lab.node.local.state.mode is StationMode.DISARMED
+
+
+def test_a_latch_is_looked_into_and_cleared_by_the_person_alone(lab):
+    lab.person.agrees.set()
+    station = lab.join()
+    AskingOperator().arm_once(station)
+    lab.node.local.stop(by="the test")
+    until(lambda: station.state.mode is StationMode.LATCHED)
+    AskingOperator().rearm(station, seed=1, epoch=0)
+    assert lab.person.asked == ["arm", "stopped by the test", "clear"]
+    assert station.state.mode is StationMode.ENGAGED
+
+
+def test_no_answer_of_the_cell_crosses_the_bus(lab):
+    station = lab.join()
+    with pytest.raises(SafetyError, match="no bus carries it"):
+        station.arm(by="somebody", answer=Answer("1234", by="console"))
+    assert lab.person.asked == []
+
+
+def test_only_what_is_typed_after_a_question_answers_it(monkeypatch, capsys):
+    reader, writer = os.pipe()
+    with os.fdopen(reader) as keyboard:
+        monkeypatch.setattr("sys.stdin", keyboard)
+        os.write(writer, b"\nyes\n")
+        rounds = iter(range(3))
+
+        def meanwhile():
+            if next(rounds, None) is None:
+                os.write(writer, b"4711\n")
+
+        assert TerminalPerson(meanwhile).ask("the code") == "4711"
+        os.close(writer)
+        with pytest.raises(SafetyError, match="nobody is at the arm"):
+            TerminalPerson(lambda: None).await_key("again")
+    assert "the code, then Enter" in capsys.readouterr().err
+
+
+def test_waiting_for_a_person_ends_where_what_he_is_asked_for_is_void(monkeypatch):
+    reader, writer = os.pipe()
+
+    def void():
+        raise SafetyError("it is void")
+
+    with os.fdopen(reader) as keyboard, os.fdopen(writer, "w"):
+        monkeypatch.setattr("sys.stdin", keyboard)
+        with pytest.raises(SafetyError, match="it is void"):
+            TerminalPerson(void).await_key("again")
