@@ -45,7 +45,7 @@ class Publisher(Generic[T]):
     def is_read(self) -> bool:
         """Whether anybody is linked who reads it: what is dear to make need not be made for nobody."""
         try:
-            return self._publisher.matching_status.matching
+            return self._publisher.matching_status.matching  # pyright: ignore[reportAttributeAccessIssue] - its stub lacks it
         except zenoh.ZError:
             return False
 
