@@ -187,6 +187,21 @@ def test_an_arm_whose_process_fails_rests_and_the_run_goes_on(lab, node, what):
     note_fault(node, what, f"rest: {rest}; goes on")
 
 
+def test_ctrl_c_stops_the_arm_first_and_last_and_leaves_no_process(lab):
+    lab.until_moving()
+    pids = [lab.pid(node) for node in ("learning", "robot", "perception", "recorder", "twin")]
+    code, summary = lab.end()
+    assert code == summary["exit_code"] == 3, summary["events"][-12:]
+    assert summary["stop_first_ms"] is not None
+    assert summary["stop_last_ms"] is not None
+    ended = [event["node"] for event in summary["events"] if "ended with exit code" in event["what"]]
+    assert ended[-4:] == ["robot", "perception", "recorder", "twin"]
+    for pid in pids:
+        with pytest.raises(ProcessLookupError):
+            os.kill(pid, 0)
+    assert (lab.folder / "up" / "run" / "goals.csv").exists()
+
+
 @pytest.fixture(scope="module")
 def seen_lab(tmp_path_factory):
     if os.environ.get("MUJOCO_GL") not in ("egl", "osmesa"):
@@ -213,18 +228,3 @@ def test_an_arm_whose_camera_fails_rests_and_the_run_goes_on(seen_lab, what):
     told = seen_lab.log()[len(before) :]
     assert "given up" not in told
     note_fault("camera", what, f"last motion seen after {rested_s:.2f} s; goes on")
-
-
-def test_ctrl_c_stops_the_arm_first_and_last_and_leaves_no_process(lab):
-    lab.until_moving()
-    pids = [lab.pid(node) for node in ("learning", "robot", "perception", "recorder", "twin")]
-    code, summary = lab.end()
-    assert code == summary["exit_code"] == 3, summary["events"][-12:]
-    assert summary["stop_first_ms"] is not None
-    assert summary["stop_last_ms"] is not None
-    ended = [event["node"] for event in summary["events"] if "ended with exit code" in event["what"]]
-    assert ended[-4:] == ["robot", "perception", "recorder", "twin"]
-    for pid in pids:
-        with pytest.raises(ProcessLookupError):
-            os.kill(pid, 0)
-    assert (lab.folder / "up" / "run" / "goals.csv").exists()
