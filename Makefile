@@ -1,4 +1,4 @@
-# make run | test | check | bench | mutation | coverage | clean
+# make run | test | check | faults | bench | mutation | coverage | clean
 PYTHON ?= python3.11
 VENV := .venv
 BIN := $(VENV)/bin
@@ -9,7 +9,9 @@ SAFETY_TESTS := $(addprefix tests/robot/test_,$(addsuffix .py,arming arming_butt
   checks_profile clearance collision_model course cross_check gate gate_order lease lease_words lids limits_words obstacles \
   plain profile_words refusals states stop_check stop_memory stop_way stopping tenure))
 
-.PHONY: run setup check test contract test-slow bench mutation coverage clean
+FAULTS := runs/faults.jsonl
+
+.PHONY: run setup check test contract test-slow faults bench mutation coverage clean
 
 run: setup
 	$(BIN)/autotelic learn --scenario paper --rig twin --preset default --seed 0 --out $(RUN) --resume
@@ -39,6 +41,14 @@ contract: setup
 
 test-slow: setup
 	$(BIN)/python -m pytest -m slow
+
+# Each process of a rig killed, frozen and started again, and the link between two machines cut, late, lossy and doubling:
+# half an hour, then one table. What failed is told by pytest and missing there.
+faults: setup
+	mkdir -p $(dir $(FAULTS)) && rm -f $(FAULTS)
+	AUTOTELIC_FAULT_TABLE=$(abspath $(FAULTS)) MUJOCO_GL=$${MUJOCO_GL:-egl} $(BIN)/python -m pytest -m slow \
+	  tests/robot/up/test_faults_of_processes.py tests/robot/up/test_faults_of_the_link.py; code=$$?; \
+	  $(BIN)/python -m tests.support.fault_table $(FAULTS); exit $$code
 
 bench: setup
 	@failed=0; for name in $(BENCHES); do $(BIN)/autotelic bench $$name || failed=1; done; exit $$failed

@@ -36,11 +36,10 @@ class WatchingCamera:
         self.spec = CameraSpec(
             name=view.name, serial="twin", width_px=lens.width_px, height_px=lens.height_px, rate_hz=rate_hz
         )
-        model, rng = world.model, np.random.default_rng(0)
-        quality = model.vis.quality
-        quality.shadowsize, quality.offsamples = min(quality.shadowsize, view.shadow_px), view.offsamples
+        view.set_quality(world.model)
+        rng = np.random.default_rng(0)
         self._rendered = RenderedCamera(
-            model=model, data=world.data, spec=self.spec, lens=lens, T_bc=view.T_bc, optics=optics, rng=rng
+            model=world.model, data=world.data, spec=self.spec, lens=lens, T_bc=view.T_bc, optics=optics, rng=rng
         )
         self._newest: Frame | None = None
         self._is_open = False

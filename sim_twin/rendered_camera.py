@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from robot.compiled import Bytes3, Floats3, compiled
 from robot.errors import WireError
 from robot.frames import CameraSpec, Frame, frame_of
+from sim_twin.film import Film
 from sim_twin.lens import TrueLens, directions, half_angles, source_map
 from sim_twin.render import NoGLError
 
@@ -58,15 +59,18 @@ class RenderedCamera:
         T_bc: Where the camera is, base frame: z ahead, x to the right, y down in the picture.
         optics: What befalls the light.
         rng: Noise of this camera alone.
+        film: Exposes in a quarter of the time, for optics in focus that neither smear nor brighten; its own noise then
+            counts. None exposes as `develop` does.
     """
 
     def __init__(
         self, *, model: mujoco.MjModel, data: mujoco.MjData, spec: CameraSpec, lens: TrueLens,
-        T_bc: NDArray[np.float64], optics: Optics, rng: np.random.Generator,
+        T_bc: NDArray[np.float64], optics: Optics, rng: np.random.Generator, film: Film | None = None,
     ) -> None:  # fmt: skip
         if (lens.width_px, lens.height_px) != (spec.width_px, spec.height_px):
             raise ValueError(f"camera {spec.name}: expected a lens of {spec.width_px} × {spec.height_px}")
-        self.spec, self.T_bc = spec, T_bc
+        self.spec, self.T_bc, self._film = spec, T_bc, film
+        self._check_film(optics)
         self._model, self._data, self._own = model, data, mujoco.MjData(model)
         self._optics, self._rng = optics, rng
         tangents = directions(lens)
@@ -103,8 +107,9 @@ class RenderedCamera:
         """Take the frames to come through another path of light, from another place, with other noise.
 
         Raises:
-            ValueError: a sharpness other than the one it was made with.
+            ValueError: a sharpness other than the one it was made with, or what its film cannot show.
         """
+        self._check_film(optics)
         if optics.sharpness != self._optics.sharpness:
             raise ValueError(f"camera {self.spec.name}: expected sharpness {self._optics.sharpness:g} as it was made")
         self._optics, self.T_bc, self._rng = optics, T_bc, rng
@@ -138,8 +143,7 @@ class RenderedCamera:
         while self._next_ns <= now_ns:
             self._next_ns += period_ns
             self._n_taken += 1  # a frame that nobody was there to have drawn: lost, and its number with it
-        light = self._light()
-        picture = develop(light, self._optics, self._rng)
+        picture = self._picture()
         self._waiting.append(
             frame_of(
                 picture, camera=self.spec.name, sequence=self._n_taken, stamp_ns=now_ns,
@@ -148,23 +152,37 @@ class RenderedCamera:
         )  # fmt: skip
         self._n_taken += 1
 
+    def _check_film(self, optics: Optics) -> None:
+        if self._film is not None and (optics.n_smear, optics.defocus_px, optics.exposure) != (1, 0.0, 1.0):
+            raise ValueError(f"camera {self.spec.name}: expected optics in focus, exposed once at 1, for a quick film")
+
+    def _picture(self) -> NDArray[np.uint8]:
+        """Return what the frame holds.  -> (height, width, 3)"""
+        if self._film is None:
+            return develop(self._light(), self._optics, self._rng)
+        self._stand(0.0)
+        return self._film.expose(self._drawn(self._own), self._sources)
+
     def _light(self) -> NDArray[np.float64]:
         """Return what falls on the sensor while the shutter is open, 0 to 255.  -> (height, width, 3)"""
-        n, data, own = self._optics.n_smear, self._data, self._own
+        n = self._optics.n_smear
+        total = np.zeros((*self._sources.shape[:2], 3))
+        for k in range(n):
+            self._stand(((k + 0.5) / n - 0.5) * self._optics.exposure_s)
+            total += sampled(self._drawn(self._own), self._sources)
+        return total / n
+
+    def _stand(self, dt_s: float) -> None:
+        """Have what is drawn stand as the world does, or a moment from then."""
+        data, own = self._data, self._own
         # With sleeping on, what cannot move is placed by a reset and never again: a table laid out anew was drawn as
         # it had been when the camera was made.
         mujoco.mj_resetData(self._model, own)
-        total = np.zeros((*self._sources.shape[:2], 3))
-        for k in range(n):
-            own.qpos[:], own.mocap_pos[:], own.mocap_quat[:] = data.qpos, data.mocap_pos, data.mocap_quat
-            if n > 1:
-                mujoco.mj_integratePos(
-                    self._model, own.qpos, data.qvel, ((k + 0.5) / n - 0.5) * self._optics.exposure_s
-                )
-            mujoco.mj_kinematics(self._model, own)
-            mujoco.mj_camlight(self._model, own)
-            total += sampled(self._drawn(own), self._sources)
-        return total / n
+        own.qpos[:], own.mocap_pos[:], own.mocap_quat[:] = data.qpos, data.mocap_pos, data.mocap_quat
+        if dt_s:
+            mujoco.mj_integratePos(self._model, own.qpos, data.qvel, dt_s)
+        mujoco.mj_kinematics(self._model, own)
+        mujoco.mj_camlight(self._model, own)
 
     def _drawn(self, data: mujoco.MjData) -> NDArray[np.uint8]:
         """Return the world through a straight lens."""

@@ -16,10 +16,11 @@ from robot.errors import RobotConfigError, WireError
 from robot.frames import CameraSpec, Frame
 from sim_twin.camera_plant import OPTICS
 from sim_twin.controller.motion import SLICE_S
+from sim_twin.film import Film
 from sim_twin.plant import TwinWorld
 from sim_twin.render import HOW_TO_DRAW, NoGLError, light_lamps
 from sim_twin.rendered_camera import RenderedCamera
-from sim_twin.studio.viewing import RIG_VIEW
+from sim_twin.studio.viewing import SERVED_VIEW
 from sim_twin.twin_pose import stand_as
 
 __all__ = ["ServedCamera"]
@@ -47,21 +48,23 @@ class ServedCamera:
     def __init__(
         self, *, scenario: Scenario, arm: ArmConfig, rig: Rig, bus: Bus, now_ns: Callable[[], int] = monotonic_ns
     ) -> None:
-        if rig.camera is None or rig.camera.name != RIG_VIEW.name:
-            raise RobotConfigError(f"rig {rig.name}: expected the camera {RIG_VIEW.name}, which is what the twin has")
-        lens = RIG_VIEW.lens
+        if rig.camera is None or rig.camera.name != SERVED_VIEW.name:
+            raise RobotConfigError(
+                f"rig {rig.name}: expected the camera {SERVED_VIEW.name}, which is what the twin has"
+            )
+        lens = SERVED_VIEW.lens
         self._bus, self._now_ns = bus, now_ns
         self.spec = CameraSpec(
-            name=RIG_VIEW.name, serial="twin", width_px=lens.width_px, height_px=lens.height_px,
+            name=SERVED_VIEW.name, serial="twin", width_px=lens.width_px, height_px=lens.height_px,
             rate_hz=rig.camera.rate_hz,
         )  # fmt: skip
         times = msgspec.structs.replace(rig, tick_s=SLICE_S, physics_s=SLICE_S)
         self._world = world = TwinWorld(arm, scenario, times)
-        quality = world.model.vis.quality
-        quality.shadowsize, quality.offsamples = min(quality.shadowsize, RIG_VIEW.shadow_px), RIG_VIEW.offsamples
+        SERVED_VIEW.set_quality(world.model)
+        rng = np.random.default_rng(0)
         self._rendered = RenderedCamera(
-            model=world.model, data=world.data, spec=self.spec, lens=lens, T_bc=RIG_VIEW.T_bc, optics=LIGHT,
-            rng=np.random.default_rng(0),
+            model=world.model, data=world.data, spec=self.spec, lens=lens, T_bc=SERVED_VIEW.T_bc, optics=LIGHT,
+            rng=rng, film=Film(read_noise=LIGHT.read_noise, shot_noise=LIGHT.shot_noise, rng=rng),
         )  # fmt: skip
         self._newest: Received[TwinPose] | None = None
         self._subscriber: Subscriber[TwinPose] | None = None

@@ -13,6 +13,7 @@ from time import monotonic_ns, sleep
 from typing import Any
 
 import msgspec
+import numpy as np
 import zenoh
 
 from robot.bus.link import on_link, open_link
@@ -63,7 +64,8 @@ class Job(msgspec.Struct, frozen=True, kw_only=True):
     size: str
     endpoints: dict[str, str]
     """Where each transport's reader listens. The transports take turns, message by message, so that what else the
-    machine does meets all of them alike."""
+    machine does meets all of them alike; in an order that is drawn anew each time, for who comes right after another
+    one that is built like it finds its code in the caches."""
     n: int
     """Of messages over each."""
     period_ns: int
@@ -112,10 +114,10 @@ def main() -> None:
             open_writers.callback(close)
             puts.append(put)
         sleep(JOIN_S)
-        due_ns = monotonic_ns()
+        due_ns, rng = monotonic_ns(), np.random.default_rng(0)
         for _ in range(job.n):
-            for put in puts:
-                put()
+            for k in rng.permutation(len(puts)).tolist():
+                puts[k]()
                 due_ns += job.period_ns // len(puts)
                 sleep(max(due_ns - monotonic_ns(), 0) * 1e-9)
         sleep(LINGER_S)

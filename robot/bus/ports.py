@@ -41,6 +41,14 @@ class Publisher(Generic[T]):
         )
         self._pool = shm.ShmProvider.default_backend(POOL_BYTES) if topic.is_shared_memory else None
 
+    @property
+    def is_read(self) -> bool:
+        """Whether anybody is linked who reads it: what is dear to make need not be made for nobody."""
+        try:
+            return self._publisher.matching_status.matching  # pyright: ignore[reportAttributeAccessIssue] - its stub lacks it
+        except zenoh.ZError:
+            return False
+
     def put(self, message: T, *, stamp_ns: int | None = None) -> None:
         """Write a message, stamped now unless it is known better. One that nobody is linked to read is gone.
 

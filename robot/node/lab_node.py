@@ -61,6 +61,7 @@ def open_robot_node(resolved: Resolved, *, pictures: Path = Path("resets")) -> G
                 bus,
                 resolved.scenario,
                 tell=lambda state: node.tell_measured(state),
+                measure=loop.measure,
                 gives_up=lambda: node.is_stop_due,
             )
             if is_fed(rig)

@@ -24,7 +24,7 @@ from robot.messages import ArmState, Percept, SceneState, Vec3
 
 __all__ = ["RemotePerception"]
 
-ANSWER_S = 0.015
+ANSWER_S, AGAIN_S = 0.015, 0.05
 FIRST_S, N_FIRST = 5.0, 3
 """How long a perception node may be away while the arm rests, and how many percepts tell of a table that was just laid
 out."""
@@ -37,16 +37,17 @@ class RemotePerception:
         bus: open.
         scenario: which distances there are.
         tell: tells a measurement on the bus.
+        measure: reads the arm anew, while it rests.
         gives_up: asked while a new table is waited for: somebody wants something more urgent.
         now_ns: this process's monotonic clock.
     """
 
     def __init__(
-        self, bus: Bus, scenario: Scenario, *, tell: Callable[[ArmState], object],
+        self, bus: Bus, scenario: Scenario, *, tell: Callable[[ArmState], object], measure: Callable[[], ArmState],
         gives_up: Callable[[], bool] = lambda: False, now_ns: Callable[[], int] = monotonic_ns,
     ) -> None:  # fmt: skip
         assert PERCEPT.deadline_s is not None, "a percept grows old"
-        self._tell, self._gives_up, self._now_ns = tell, gives_up, now_ns
+        self._tell, self._measure, self._gives_up, self._now_ns = tell, measure, gives_up, now_ns
         self._names, self._table_m = scenario.distances, scenario.table.height_m
         self._deadline_ns = round(PERCEPT.deadline_s * 1e9)
         self._came = Condition()
@@ -75,7 +76,7 @@ class RemotePerception:
         del scene  # the perception node has it
         is_new_table, self._is_new_table = self._is_new_table, False
         if is_new_table:
-            self._await_table(arm)
+            arm = self._await_table()
         self._tell(arm)
         with self._came:
             self._came.wait_for(lambda: self._is_at(arm), ANSWER_S)
@@ -88,11 +89,15 @@ class RemotePerception:
         """Hear no more. Idempotent."""
         self._subscriber.close()
 
-    def _await_table(self, arm: ArmState) -> None:
-        """Wait for some percepts from now on, until one knows where anything is: the arm rests meanwhile.
+    def _await_table(self) -> ArmState:
+        """Wait for some percepts from now on, until one knows where anything is, and return the arm as it is then.
+
+        The arm rests and is measured anew all the time: a picture counts that was there when the arm was measured, and
+        at the reset's own measurement there was none of the new table yet.
 
         Raises:
             StaleStateError: the perception node does not say that it has forgotten the table before.
+            RobotError: the arm cannot be read.
         """
         try:
             self._forgets.ask(Forget())
@@ -103,9 +108,10 @@ class RemotePerception:
         end_ns = self._now_ns() + round(FIRST_S * 1e9)
         wanted = self._n + N_FIRST
         while not self._is_settled(wanted) and self._now_ns() < end_ns and not self._gives_up():
-            self._tell(arm)
+            self._tell(self._measure())
             with self._came:
-                self._came.wait_for(lambda: self._is_settled(wanted), 10 * ANSWER_S)
+                self._came.wait_for(lambda: self._is_settled(wanted), AGAIN_S)
+        return self._measure()
 
     def _is_settled(self, wanted: int) -> bool:
         """Whether so many percepts came, and the newest shows a table: a camera needs a frame of it first."""

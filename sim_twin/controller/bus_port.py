@@ -1,7 +1,7 @@
 """The twin on the bus: its truth 100 times a second, and resets of its table. Polled by the controller's loop.
 
-How all its bodies stand goes out too, 50 times a second, for a process that renders a camera: a simulated world has no
-light that would bring it there.
+How all its bodies stand goes out too, 50 times a second, where a process reads it that renders a camera: a simulated
+world has no light that would bring it there. Where none does, the loop is not held up by it.
 
 Whoever resets the table of a cell also looks after an arm that has stopped: a protective stop is unlocked, when five
 seconds have passed since, and the program that it interrupted is ended, before the table is laid out. Other stops stay.
@@ -21,6 +21,8 @@ from sim_twin.twin_pose import pose_of
 __all__ = ["BusPort"]
 
 TRUTH_SLICES, POSE_SLICES, SLICES_PER_S = 5, 10, 500.0
+POSE_PHASE = 3
+"""Truth goes out in other slices: two messages would make one of them twice as long."""
 PATIENCE_SLICES = 500
 """How long a program may take to end, and the arm to come to rest, once a reset was asked for."""
 
@@ -73,7 +75,7 @@ class BusPort:
             self._act(action)
         if n_slices % TRUTH_SLICES == 0:
             self._publisher.put(self._truth.read())
-        if n_slices % POSE_SLICES == 0:
+        if n_slices % POSE_SLICES == POSE_PHASE and self._poses.is_read:
             self._poses.put(pose_of(self._robot.machine.world))
 
     def close(self) -> None:

@@ -49,8 +49,7 @@ class TwinPhotographer:
         self._world, self._truth = plant.world, plant.truth
         self._kinematics, self._sharpness = Kinematics(resolved.arm), sharpness
         model = self._world.model
-        model.vis.quality.shadowsize = min(model.vis.quality.shadowsize, view.shadow_px)
-        model.vis.quality.offsamples = view.offsamples
+        view.set_quality(model)
         self._lighting, self._view, self._T_bc = Lighting(model), view, view.T_bc
         lens = view.lens
         self._spec = CameraSpec(

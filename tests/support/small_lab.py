@@ -45,12 +45,12 @@ experiment: {epochs: 3, trials: 1, steps: 6, evaluate_every: 50, test_epochs: 1,
 """
 
 
-def make_lab(folder, host, *, cell=None, **rig):
-    """Write scenario, rules, learner, cell and rig into a folder, and return the rig's file."""
+def make_lab(folder, host, *, cell=None, rig="virtual_lab", **changes):
+    """Write scenario, rules, learner, cell and a shipped rig, changed, into a folder, and return the rig's file."""
     for name, text in (("small", SCENARIO), ("small_rules", RULES), ("fast", FAST)):
         (folder / f"{name}.yaml").write_text(text)
-    tree = yaml.safe_load((ROOT / "config/rigs/virtual_lab.yaml").read_text())
-    tree |= {"name": "small_lab", "address": host, "bus": f"tcp/{host}:7447", **rig}
+    tree = yaml.safe_load((ROOT / f"config/rigs/{rig}.yaml").read_text())
+    tree |= {"name": "small_lab", "address": host, "bus": f"tcp/{host}:7447", **changes}
     if cell is not None:
         (folder / "cell.yaml").write_text(cell)
         tree["cell"] = "./cell.yaml"

@@ -264,3 +264,15 @@ def test_closing_twice_does_nothing_and_what_is_closed_says_so(hub, endpoint):
         publisher.put(EMPTY)
     with pytest.raises(BusError, match="open it first"):
         bus.subscriber(TRUTH, print)
+
+
+def test_a_writer_knows_whether_anybody_reads_it_across_the_hub_and_no_more_once_he_has_left(hub, endpoint):
+    publishers = [hub.publisher(TRUTH)]
+    with join(endpoint, Role.TWIN, source="other") as writer:
+        publishers.append(writer.publisher(TRUTH))
+        assert not any(publisher.is_read for publisher in publishers)
+        with join(endpoint) as reader:
+            reader.subscriber(TRUTH, lambda _: None)
+            until(lambda: all(publisher.is_read for publisher in publishers))
+        until(lambda: not any(publisher.is_read for publisher in publishers))
+    assert not publishers[1].is_read, "of a bus that is closed nobody reads"

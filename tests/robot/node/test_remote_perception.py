@@ -30,7 +30,13 @@ class Air:
 
     def __init__(self, answer=None):
         self.now_ns, self.told, self._answer = 10_000_000_000, [], answer
-        self.remote = RemotePerception(self, SCENARIO, tell=self._tell, now_ns=lambda: self.now_ns)
+        self.remote = RemotePerception(
+            self, SCENARIO, tell=self._tell, measure=self._measure, now_ns=lambda: self.now_ns
+        )
+
+    def _measure(self):
+        self.now_ns += 1_000
+        return arm_state(Q, stamp_ns=self.now_ns)
 
     def asker(self, query):
         assert query is FORGET
@@ -133,7 +139,7 @@ def test_after_a_reset_percepts_from_before_do_not_count():
     air = Air(answer_at_once)
     air.remote.forget()
     state = arm(air)
-    assert air.remote.perceive(state, None).stamp_ns == state.stamp_ns
+    assert air.remote.perceive(state, None).stamp_ns == air.told[-1].stamp_ns > state.stamp_ns
     assert len(air.told) > 3
 
 
@@ -171,6 +177,22 @@ def test_where_nobody_says_that_it_is_forgotten_nothing_is_perceived_and_it_is_a
         assert air.n_forgotten == n
     air.is_alone = False
     assert air.remote.perceive(arm(air), None).stamp_ns == air.now_ns
+
+
+def test_a_new_table_is_looked_at_with_new_measurements_for_no_picture_of_it_was_there_at_the_first():
+    def answer(air, state):
+        known = percept(PLACES, tcp_m=state.tcp_position_m, stamp_ns=state.stamp_ns)
+        is_seen = state.stamp_ns > exposed_ns
+        things = tuple(msgspec.structs.replace(thing, is_valid=is_seen) for thing in known.objects)
+        air.now_ns += 20_000_000
+        air.put(msgspec.structs.replace(known, objects=things), seen_ns=state.stamp_ns)
+
+    air = Air(answer)
+    exposed_ns = air.now_ns + 100_000_000
+    found = air.remote.perceive(arm(air), None)
+    assert all(thing.is_valid for thing in found.objects)
+    assert exposed_ns < found.stamp_ns < exposed_ns + 200_000_000
+    assert found.stamp_ns == air.told[-1].stamp_ns
 
 
 def test_of_a_new_table_percepts_are_waited_for_until_one_knows_where_anything_is():

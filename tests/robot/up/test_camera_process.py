@@ -35,7 +35,7 @@ def make_rig(folder):
     writer.release()
     tree = msgspec.to_builtins(load_rig("virtual_lab_camera"))
     tree |= {"address": HOST, "bus": f"tcp/{HOST}:7447"}
-    tree["camera"] |= {"source": "perception.cameras.video:VideoCamera", "device": "./film.avi"}
+    tree["camera"] |= {"source": "perception.cameras.video:VideoCamera", "device": "./film.avi", "rate_hz": 20.0}
     (folder / "rig.yaml").write_text(yaml.safe_dump(tree))
 
 

@@ -1,6 +1,7 @@
 """`autotelic up` on a small lab: each process is killed or frozen while the arm moves; the physics' joints are judged.
 
-Times are the twin's own, slice by slice: a machine that is busy elsewhere slows it down with all else.
+Times are the twin's own, slice by slice: a machine that is busy elsewhere slows it down with all else. `make faults`
+prints what came of each as a table, the link's faults beside them.
 """
 
 import json
@@ -13,36 +14,41 @@ from contextlib import suppress
 import pytest
 
 from sim_twin.controller.process import ControllerProcessError, ask_fault
+from tests.support.fault_table import note_fault
 from tests.support.small_lab import SCENARIO, make_lab, start
 
 pytestmark = [pytest.mark.realtime, pytest.mark.slow]
 
-HOST = "127.0.0.78"
+HOST, SEEN_HOST = "127.0.0.78", "127.0.0.86"
 ENDLESS = """\
 name: endless
-experiment: {epochs: 1000, trials: 1, steps: 200, evaluate_every: 500, test_epochs: 1, checkpoint_every: 1}
+experiment: {epochs: 1000, trials: 1, steps: 200, evaluate_every: 500, test_epochs: 1, checkpoint_every: 1,
+  void_limit: 500}
 """
 SLICE_S, STILL_RAD_S, MOVES_RAD_S = 0.002, 0.01, 0.15
-REST_S = 0.8
+REST_S, SEEN_REST_S = 0.8, 1.4
 """From the fault to rest: 120 ms until silence is noticed, the stop itself, and what a poll over a port takes."""
-CASES = [
-    (node, what)
-    for node in ("learning", "robot", "perception", "twin")
-    for what in ("kill", "freeze_1s", "freeze_8s", "terminate")
-]  # fmt: skip
+FAULTS = ("kill", "freeze_1s", "freeze_30s", "terminate")
+CASES = [(node, what) for node in ("learning", "robot", "perception", "twin") for what in FAULTS]
 
 
 class Up:
-    """A supervised lab."""
+    """A supervised lab.
 
-    def __init__(self, folder):
-        self.folder = folder
-        make_lab(folder, HOST, cell=None)
+    Args:
+        folder: for its files.
+        host: its controller's address.
+        scenario: its table.
+        rig: a shipped one, at that address.
+    """
+
+    def __init__(self, folder, host=HOST, *, scenario="small.yaml", rig="virtual_lab"):
+        self.folder, self.host = folder, host
+        make_lab(folder, host, rig=rig, cell=None, max_latches=10_000)
         (folder / "endless.yaml").write_text(ENDLESS)
         self.process = start(
-            folder, "up", "rig.yaml", "--scenario", "small.yaml", "--out", "up", "--json", "--", "--preset",
-            "endless.yaml",
-        )  # fmt: skip
+            folder, "up", "rig.yaml", "--scenario", scenario, "--out", "up", "--json", "--", "--preset", "endless.yaml"
+        )
 
     def log(self):
         path = self.folder / "up" / "logs" / "supervisor.log"
@@ -53,7 +59,7 @@ class Up:
 
     def truth(self):
         try:
-            return ask_fault(HOST, "truth")
+            return ask_fault(self.host, "truth")
         except ControllerProcessError:
             return None
 
@@ -105,6 +111,21 @@ def bring_about(what, pid):
     os.kill(pid, {"kill": signal.SIGKILL, "terminate": signal.SIGTERM}.get(what, signal.SIGSTOP))
 
 
+def thaw(what, pid, *, frozen_s=0.0):
+    """Have a process that was frozen go on when its time is over; one that was killed meanwhile is not waited for."""
+    if not what.startswith("freeze"):
+        return
+    end_s = time.monotonic() + float(what[7:-1]) - frozen_s
+    while time.monotonic() < end_s:
+        try:
+            os.kill(pid, 0)
+        except ProcessLookupError:
+            break
+        time.sleep(0.02)
+    with suppress(ProcessLookupError):
+        os.kill(pid, signal.SIGCONT)
+
+
 def rests_after_s(lab, seconds):
     """Return when the arm rested, from now on, by the twin's slices; None where it cannot be seen."""
     first = lab.truth()
@@ -121,23 +142,21 @@ def rests_after_s(lab, seconds):
     return (moved - first["n_slices"]) * SLICE_S
 
 
-@pytest.mark.parametrize("what", ["kill", "freeze_1s", "freeze_8s"])
+@pytest.mark.parametrize("what", FAULTS)
 def test_an_arm_whose_recorder_fails_goes_on(lab, what):
     lab.until_moving()
     lab.until_recording()
     before, pid = lab.log(), lab.pid("recorder")
     bring_about(what, pid)
     lab.until_moving(5.0)
-    if what.startswith("freeze"):
-        time.sleep(float(what[7:-1]))
-        with suppress(ProcessLookupError):  # one that was frozen for long was killed
-            os.kill(pid, signal.SIGCONT)
+    thaw(what, pid)
     if what != "freeze_1s":
         lab.until_told("recorder: started as process", len(before))
     lab.until_moving()
     told = lab.log()[len(before) :]
     assert "arm is stopped" not in told
     assert "stop confirmed" not in told
+    note_fault("recorder", what, "the arm goes on")
 
 
 @pytest.mark.parametrize(("node", "what"), CASES, ids=[f"{node}_{what}" for node, what in CASES])
@@ -149,27 +168,23 @@ def test_an_arm_whose_process_fails_rests_and_the_run_goes_on(lab, node, what):
         rested_s = 0.0
     else:
         rested_s = None if node == "twin" else rests_after_s(lab, 0.95)
-    if what.startswith("freeze"):
-        time.sleep(max(0.0, float(what[7:-1]) - (0.0 if node == "twin" else 0.95)))
-        try:
-            os.kill(pid, signal.SIGCONT)
-        except ProcessLookupError:
-            assert what == "freeze_8s"
-    with (lab.folder / "rests.txt").open("a") as rests:
-        rests.write(f"{node} {what} {rested_s}\n")
+    thaw(what, pid, frozen_s=0.0 if node == "twin" else 0.95)
     assert node == "twin" or rested_s < REST_S
-    if what in ("kill", "terminate", "freeze_8s"):
+    if what in ("kill", "terminate", "freeze_30s"):
         lab.until_told(f"{node}: started as process", len(before))
     lab.until_moving()
     told = lab.log()[len(before) :]
     if what in ("kill", "terminate"):
         assert f"{node}: " in told
         assert "it is started again in" in told
-    if what == "freeze_8s":
+    if what == "freeze_30s":
         assert f"{node}: silent for 1.5 s: the arm is stopped" in told
         assert "it is killed" in told
     if node != "learning":
         assert "learning: finished" not in told
+    asked = node == "learning" and what == "terminate"
+    rest = "its epoch ends first" if asked else "the world ends or stands" if node == "twin" else f"{rested_s:.2f} s"
+    note_fault(node, what, f"rest: {rest}; goes on")
 
 
 def test_ctrl_c_stops_the_arm_first_and_last_and_leaves_no_process(lab):
@@ -185,3 +200,31 @@ def test_ctrl_c_stops_the_arm_first_and_last_and_leaves_no_process(lab):
         with pytest.raises(ProcessLookupError):
             os.kill(pid, 0)
     assert (lab.folder / "up" / "run" / "goals.csv").exists()
+
+
+@pytest.fixture(scope="module")
+def seen_lab(tmp_path_factory):
+    if os.environ.get("MUJOCO_GL") not in ("egl", "osmesa"):
+        pytest.skip("needs MUJOCO_GL=egl or osmesa, for its camera is drawn")
+    made = Up(tmp_path_factory.mktemp("seen"), SEEN_HOST, scenario="paper", rig="virtual_lab_camera")
+    yield made
+    if made.process.poll() is None:
+        made.process.send_signal(signal.SIGTERM)
+        made.process.communicate(timeout=90)
+
+
+@pytest.mark.parametrize("what", FAULTS)
+def test_an_arm_whose_camera_fails_rests_and_the_run_goes_on(seen_lab, what):
+    """One picture that is 600 ms old stops the arm; the supervisor sees an end at once."""
+    seen_lab.until_moving()
+    before, pid = seen_lab.log(), seen_lab.pid("camera")
+    bring_about(what, pid)
+    rested_s = rests_after_s(seen_lab, 0.95 if what == "freeze_1s" else 3.0)
+    thaw(what, pid, frozen_s=0.95 if what == "freeze_1s" else 3.0)
+    if what != "freeze_1s":
+        assert rested_s < SEEN_REST_S
+        seen_lab.until_told("camera: started as process", len(before))
+    seen_lab.until_moving()
+    told = seen_lab.log()[len(before) :]
+    assert "given up" not in told
+    note_fault("camera", what, f"last motion seen after {rested_s:.2f} s; goes on")

@@ -14,6 +14,7 @@ from pathlib import Path
 import pytest
 
 from sim_twin.controller.process import ControllerProcessError, ask_fault
+from tests.support.fault_table import note_fault
 from tests.support.netns import EmulatedCable, inside, why_not
 from tests.support.small_lab import autotelic, make_lab
 
@@ -145,10 +146,11 @@ def test_over_a_bad_link_the_arm_rests_where_it_must_and_the_run_goes_on_after(l
     lab.cable.set(**CASES[what])
     rested_s, share = lab.last_motion_s(FAULT_S)
     lab.cable.set()
-    with (lab.folder / "link.txt").open("a") as told:
-        told.write(f"{what}: last motion after {rested_s:.2f} s, moving {100 * share:.0f} % of {FAULT_S:g} s\n")
     if what in ("cut", "delay_200ms"):
         assert rested_s < REST_S
     lab.until_moving()
     assert lab.learner.poll() is None
     assert "given up" not in lab.log()
+    note_fault(
+        "link", what, f"last motion after {rested_s:.2f} s, moving {100 * share:.0f} % of {FAULT_S:g} s; goes on"
+    )
