@@ -44,6 +44,23 @@ def test_every_step_renews_the_lease(world):
     assert station.state.mode is StationMode.ENGAGED
 
 
+def test_a_source_that_says_that_it_is_there_in_time_keeps_its_lease_and_one_that_is_late_does_not(world):
+    station, _, host = world
+    for _ in range(5):
+        host.now_ns += LIFE_NS
+        station.renew_lease()
+    assert station.state.mode is StationMode.ENGAGED
+    host.now_ns += LIFE_NS + 1
+    station.renew_lease()
+    assert station.state.mode is StationMode.DISARMED
+
+
+def test_where_nobody_has_a_lease_there_is_none_to_renew():
+    station = build_station(fake_rig())
+    station.renew_lease()
+    assert (station.lease_number, station.state.mode) == (0, StationMode.DISARMED)
+
+
 def test_a_source_that_was_gone_for_longer_than_its_lease_finds_the_arm_stopped_and_disarmed(world):
     station, plant, host = world
     station.step(Twist(linear_m_s=(0.1, 0.0, 0.0)))
