@@ -124,8 +124,17 @@ def test_a_stop_of_what_is_only_armed_disarms_it(world):
 
 def test_a_hand_over_of_nothing_is_refused():
     station = build_station(fake_rig())
-    with pytest.raises(SafetyError, match="nobody has it"):
+    with pytest.raises(SafetyError, match=r"^a hand-over: expected a source that has the lease, nobody has it$"):
         station.hand_over("learner")
+
+
+def test_who_took_over_keeps_the_lease_for_its_own_life_and_no_longer(world):
+    station, _, host = world
+    given = station.hand_over("learner", life_ns=LIFE_NS // 2)
+    host.now_ns += LIFE_NS // 2
+    assert station.lease_number == given.number
+    host.now_ns += 1
+    assert station.lease_number == 0
 
 
 @pytest.mark.parametrize(
