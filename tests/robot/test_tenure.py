@@ -101,6 +101,27 @@ def test_a_hand_over_stops_the_arm_and_disarms(world):
     assert station.state.source == "learner"
 
 
+def test_who_keeps_the_lease_is_never_stopped(world):
+    station, plant, _ = world
+    n_stops = plant.arm.n_stops
+    for _ in range(3):
+        station.step(Hold())
+        assert station.state.mode is StationMode.ENGAGED
+    assert plant.arm.n_stops == n_stops
+
+
+def test_who_lets_go_of_the_lease_leaves_a_disarmed_arm_that_another_may_have(world):
+    station, _, _ = world
+    station.let_go()
+    assert (station.lease_number, station.state.mode) == (0, StationMode.DISARMED)
+    with pytest.raises(SafetyError, match="nobody has it"):
+        station.hand_over("learner")
+    station.take_lease("learner")
+    assert station.lease_number > 0
+    station.let_go()
+    station.let_go()
+
+
 def test_nobody_else_gets_the_lease_but_anybody_may_stop(world):
     station, plant, _ = world
     with pytest.raises(SafetyError, match="teleop has it"):
