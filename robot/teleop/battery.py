@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import msgspec
 import numpy as np
 
-from robot.teleop import aimed, creeping, hostile, human
+from robot.teleop import aimed, creeping, hostile, human, weighing
 from robot.teleop.asks import Arena, Ask, Look, Maker
 from robot.teleop.search import Candidates, played
 
@@ -20,9 +20,10 @@ FAMILIES: dict[str, Maker] = {
         aimed.at_the_things, aimed.circles, aimed.fast_joints, aimed.full_speed, aimed.gate_at_places,
         aimed.gate_grips, aimed.gate_presses, aimed.grasps, aimed.reversals, aimed.tilts, human.reaches,
         human.presses, human.hesitations, creeping.gate_creeps, creeping.gate_leans, creeping.gate_hands,
+        weighing.gate_weighs,
     )
 }  # fmt: skip
-LATE = ("gate_creeps", "gate_leans", "gate_hands")
+LATE = ("gate_creeps", "gate_leans", "gate_hands", "gate_weighs")
 """Families that came later: they have the last numbers of those that stand alone, so that no other's changed."""
 LATE_SHARE = 20
 """One stream in so many is theirs."""

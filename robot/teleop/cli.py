@@ -107,7 +107,7 @@ def check(
         with redirected_stdout(STDERR):
             answer: Answer = checker(resolved, wanted)
     except KeyboardInterrupt:
-        then = "begins again" if out is None or mutate else "goes on where this one was"
+        then = "begins again" if out is None else "goes on where this one was"
         typer.echo(f"interrupted: nothing was decided, nothing is held any more; the same command {then}", err=True)
         raise typer.Exit(1) from None
     if json:

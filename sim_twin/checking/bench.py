@@ -3,7 +3,8 @@
 from config.loader import resolve
 from robot.bench import BenchReport, bench_report
 from robot.teleop.wanted import Wanted
-from sim_twin.checking.command import measured, setup_of
+from sim_twin.checking.check import setup_of
+from sim_twin.checking.command import measured
 
 __all__ = ["bench_safety"]
 

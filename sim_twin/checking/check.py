@@ -1,11 +1,7 @@
 """The battery, or a seeded part of it, against a rig's stack on nominal and perturbed twins, on all processors."""
 
-import os
-import signal
 from collections.abc import Callable, Iterator
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
-from functools import lru_cache
-from multiprocessing import get_context
+from functools import lru_cache, partial
 
 import msgspec
 import numpy as np
@@ -14,16 +10,17 @@ from config.limits import Profile
 from config.resolved import Resolved
 from robot.teleop import Battery, Search
 from robot.teleop.search import Candidates
+from robot.teleop.wanted import Wanted
 from sim_twin.as_seen import Beginning
 from sim_twin.checking.ring import Ring, StreamResult
+from sim_twin.checking.spread import spread
 from sim_twin.perturb import PERTURBATIONS
 
-__all__ = ["FULL_STREAMS", "N_COMMANDS", "Block", "Setup", "check_streams", "part_of", "rerun"]
+__all__ = ["FULL_STREAMS", "N_COMMANDS", "Block", "Setup", "check_streams", "part_of", "rerun", "setup_of"]
 
 FULL_STREAMS, N_COMMANDS = 3072, 334
 PART = 10
 BLOCK_STREAMS = 8
-LOOK_S = 0.2
 
 
 class Setup(msgspec.Struct, frozen=True, kw_only=True):
@@ -43,6 +40,17 @@ class Setup(msgspec.Struct, frozen=True, kw_only=True):
     def battery(self) -> Battery:
         """The numbered streams."""
         return Battery(seed=self.seed, n_streams=self.n_streams, n_plants=len(PERTURBATIONS))
+
+
+def setup_of(resolved: Resolved, wanted: Wanted, *, start: Beginning | None = None) -> Setup:
+    """Return what is checked, by the options; `start` is where arm and table are at each stream's beginning."""
+    return Setup(
+        resolved=resolved,
+        profile=resolved.profile,
+        seed=wanted.seed,
+        n_commands=wanted.n_commands or N_COMMANDS,
+        start=start,
+    )
 
 
 class Block(msgspec.Struct, frozen=True, kw_only=True):
@@ -118,32 +126,7 @@ def check_streams(
     Raises:
         KeyboardInterrupt: a person had enough; no worker is left behind.
     """
-    coded = msgspec.json.encode(setup)
-    if n_workers == 1:
-        for block in blocks:
-            heard(run_block(coded, block))
-            look()
-        return
-    pool = ProcessPoolExecutor(n_workers, mp_context=get_context("spawn"), initializer=_leave_ctrl_c)
-    futures: list[Future[list[StreamResult]]] = []
-    try:
-        futures.extend(pool.submit(run_block, coded, block) for block in blocks)
-        pending = set(futures)
-        while pending:
-            done, pending = wait(pending, timeout=LOOK_S, return_when=FIRST_COMPLETED)
-            look()
-            for future in done:
-                heard(future.result())
-    finally:
-        for future in futures:
-            future.cancel()
-        pool.shutdown(wait=True, cancel_futures=True)
-
-
-def _leave_ctrl_c() -> None:
-    """A worker ends when its pool does: Ctrl-C is for the process that a person started."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    os.environ["OMP_NUM_THREADS"] = "1"
+    spread(partial(run_block, msgspec.json.encode(setup)), blocks, n_workers=n_workers, heard=heard, look=look)
 
 
 @lru_cache(maxsize=2 * len(PERTURBATIONS))

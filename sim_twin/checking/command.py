@@ -1,6 +1,5 @@
 """What `autotelic teleop check` does on a twin: progress, report, figure. The command itself knows no twin."""
 
-import os
 from collections.abc import Callable
 from pathlib import Path
 from time import perf_counter
@@ -10,40 +9,28 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from config.resolved import Resolved
-from robot.bench import BenchResult, bench_report
+from robot.bench import bench_report
 from robot.teleop.wanted import Answer, Wanted
-from sim_twin.as_seen import Beginning
-from sim_twin.checking.check import N_COMMANDS, Setup, check_streams, part_of, rerun
+from sim_twin.checking.check import Setup, check_streams, part_of, rerun, setup_of
 from sim_twin.checking.kept import KeptStreams
-from sim_twin.checking.mutations import try_mutation
-from sim_twin.checking.report import CheckReport, MutationReport, as_json, draw, shown, shown_mutations
+from sim_twin.checking.report import CheckReport, as_json, draw, shown
 from sim_twin.checking.ring import StreamResult
+from sim_twin.checking.spread import n_processors
 from sim_twin.checking.tally import Tally
-from sim_twin.checking.weakenings import MUTATIONS
+from sim_twin.checking.weakened import weaken_each
 
-__all__ = ["check_rig", "keep", "measured", "setup_of"]
+__all__ = ["check_rig", "keep", "measured"]
 
 
 def check_rig(resolved: Resolved, wanted: Wanted) -> Answer:
     """Check a twin's rig and return what is to be shown of it."""
     if wanted.mutate:
-        return _mutate(resolved, wanted)
+        return weaken_each(resolved, wanted)
     setup = setup_of(resolved, wanted)
     report = measured(setup, wanted)
     if wanted.out is not None:
         keep(setup, report, wanted.out)
     return Answer(json=as_json(report), shown=shown(report), is_passed=report.is_passed)
-
-
-def setup_of(resolved: Resolved, wanted: Wanted, *, start: Beginning | None = None) -> Setup:
-    """Return what is checked, by the options; `start` is where arm and table are at each stream's beginning."""
-    return Setup(
-        resolved=resolved,
-        profile=resolved.profile,
-        seed=wanted.seed,
-        n_commands=wanted.n_commands or N_COMMANDS,
-        start=start,
-    )
 
 
 def measured(setup: Setup, wanted: Wanted, *, look: Callable[[], object] = lambda: None) -> CheckReport:
@@ -65,7 +52,7 @@ def _many(setup: Setup, wanted: Wanted, look: Callable[[], object]) -> Tally:
     if wanted.n_blocks:
         blocks = blocks[: wanted.n_blocks]
     tally, kept = Tally(), KeptStreams(wanted.out, setup)
-    n_workers = wanted.n_workers or len(os.sched_getaffinity(0))
+    n_workers = wanted.n_workers or n_processors()
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
     with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
         task = progress.add_task("streams", total=sum(b.n_streams for b in blocks))
@@ -100,27 +87,3 @@ def keep(setup: Setup, report: CheckReport, folder: Path, *, about: str = "") ->
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "check.json").write_text(as_json(report) + "\n", encoding="utf-8")
     draw(setup, report, folder / "margins.png", about=about)
-
-
-def _mutate(resolved: Resolved, wanted: Wanted) -> Answer:
-    """Weaken each limit alone and see that the battery tells."""
-    begin = perf_counter()
-    n_commands = wanted.n_commands or N_COMMANDS
-    with Progress(console=Console(stderr=True), transient=True) as progress:
-        outcomes = tuple(
-            try_mutation(resolved, mutation, seed=wanted.seed, n_commands=n_commands)
-            for mutation in progress.track(MUTATIONS, description="limits weakened")
-        )
-    n_caught = sum(outcome.is_caught for outcome in outcomes)
-    rows = (
-        BenchResult(name="limits_weakened", value=len(outcomes), unit="1"),
-        BenchResult(name="caught", value=n_caught, unit="1", goal=f"{len(outcomes)}", ok=n_caught == len(outcomes)),
-    )
-    bench = bench_report("safety_mutations", rows, seconds=perf_counter() - begin)
-    report = MutationReport(
-        **msgspec.structs.asdict(bench), rig=resolved.rig.name, profile=resolved.profile.name, seed=wanted.seed,
-        outcomes=outcomes,
-    )  # fmt: skip
-    return Answer(
-        json=msgspec.json.encode(report).decode(), shown=shown_mutations(report), is_passed=n_caught == len(outcomes)
-    )

@@ -21,8 +21,8 @@ from robot.teleop import Send
 from robot.teleop.wanted import Answer, Wanted
 from robot.watching import STILL_RAD, StandStill, Watcher
 from sim_twin.as_seen import Beginning
-from sim_twin.checking.check import Setup
-from sim_twin.checking.command import keep, measured, setup_of
+from sim_twin.checking.check import Setup, setup_of
+from sim_twin.checking.command import keep, measured
 from sim_twin.checking.report import CheckReport, as_json
 from sim_twin.checking.ring import Ring
 from sim_twin.checking.shadow_report import ShadowReport, WatchedArm, shown_shadow

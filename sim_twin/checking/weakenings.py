@@ -200,7 +200,7 @@ MUTATIONS: tuple[Mutation, ...] = (
     Mutation(
         name="steady force", limits=("contact_force.steady_n",), told_by=("steady_force",),
         tighten=lambda p: _steady(p, 60.0), weaken=lambda p: _steady(p, 60.0 * BY),
-        families=("gate_leans",), n_streams=15,
+        families=("gate_weighs",),
     ),
     Mutation(
         name="greatest grip force", limits=("grip.force_n[1]",), told_by=("command_grip_force",),

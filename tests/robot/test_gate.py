@@ -166,15 +166,35 @@ def test_a_fresh_percept_lets_motion_go_on_and_none_is_asked_for_before_the_firs
         assert gate.write(nudge, arm_state(START, stamp_ns=late), now_ns=late) is None
 
 
-def test_a_push_that_rises_is_not_pressed_on_but_given_way_to(gate):
-    downwards = tuple(b - a for a, b in zip(START, Kinematics(ARM).solve((0.42, 0.0, 0.199), START), strict=True))
+@pytest.mark.parametrize("axis", range(3))
+@pytest.mark.parametrize("way", [-1.0, 1.0])
+def test_a_push_that_rises_is_not_pressed_on_but_given_way_to(gate, axis, way):
+    at_m, solver = (0.42, 0.12, 0.2), Kinematics(ARM)
+    start = solver.solve(at_m, START)
+    there = solver.solve(tuple(x + 0.001 * way * (i == axis) for i, x in enumerate(at_m)), start)
+    onwards = tuple(b - a for a, b in zip(start, there, strict=True))
     for sign, expected in ((-1.0, None), (1.0, Reason.FORCE)):
-        gate.seed(arm_state(START))
+        gate.seed(arm_state(start))
         for k, force in enumerate((200.0, 230.0)):
-            pushed = arm_state(START, force_n=(0.0, 0.0, force), stamp_ns=k * TICK_NS)
-            q = tuple(a + sign * k * d for a, d in zip(START, downwards, strict=True))
+            force_n = tuple(-way * force * (i == axis) for i in range(3))
+            pushed = arm_state(start, force_n=force_n, stamp_ns=k * TICK_NS)
+            q = tuple(a + sign * k * d for a, d in zip(start, onwards, strict=True))
             verdict = gate.write(command(q, sequence=k + 1, stamp_ns=k * TICK_NS), pushed, now_ns=k * TICK_NS)
         assert (verdict and verdict.reason) == expected
+
+
+@pytest.mark.parametrize(
+    ("by_rad", "expected"), [((0.0007,), None), ((0.0007, 0.0021, 0.0042), Reason.JOINT_ACCELERATION)]
+)
+def test_holding_still_is_refused_where_motion_was_too_fast_to_end_in_one_tick(arm, by_rad, expected):
+    limits = GateLimits.of(ARM, FakeArm(arm=ARM, tick_s=0.01).spec, table_m=0.0, tick_s=0.01)
+    made = Gate(arm=arm, limits=limits, envelope=envelope(0.01, "attended"), chain=CHAIN)
+    made.seed(arm_state(START))
+    for k in range(len(by_rad)):
+        q = (START[0] + sum(by_rad[: k + 1]), *START[1:])
+        assert made.write(command(q, sequence=k + 1), arm_state(q), now_ns=0) is None
+    verdict = made.write(command(q, sequence=len(by_rad) + 1), arm_state(q), now_ns=0)
+    assert (verdict and verdict.reason) == expected
 
 
 def test_a_wrong_intent_latches_before_any_command(gate, arm):

@@ -4,12 +4,13 @@ import math
 import numpy as np
 import pytest
 
-from robot.messages import GripCommand, Heading, Hold, JointTarget, Twist
+from robot.messages import GripCommand, Heading, Hold, JointTarget, Twist, Vec3
 from robot.safety.checks import check_intent
 from robot.teleop import Arena, Battery, Seen, Send, Silence, Write
 from robot.teleop.battery import FAMILIES, LATE
 from robot.teleop.human import minimum_jerk
 from robot.teleop.search import Candidates, played
+from robot.teleop.weighing import ASIDE_M, ASIDE_M_N, SINKING_M
 
 HOME = (2.8186, -1.7634, 2.014, -1.8213, -1.5708, -1.8938)
 GRIP = GripCommand(opening_m=0.085, force_n=235.0, speed_m_s=0.15)
@@ -115,7 +116,7 @@ def test_who_creeps_begins_anew_after_a_latch():
     def latched() -> Seen:
         return Seen(q_rad=HOME, tcp_m=(0.4, 0.0, 0.2), force_n=(0.0, 0.0, 0.0), is_latched=True)
 
-    assert writes("gate_creeps", latched) == writes("gate_leans", latched) == []
+    assert all(writes(family, latched) == [] for family in ("gate_creeps", "gate_leans", "gate_weighs"))
 
 
 def test_who_leans_on_something_goes_on_more_slowly_once_it_bears():
@@ -124,6 +125,55 @@ def test_who_leans_on_something_goes_on_more_slowly_once_it_bears():
 
     free, held = (np.diff([w.q_rad for w in writes("gate_leans", look)][20:60], axis=0) for look in (still, borne))
     assert np.abs(held).max() < 0.6 * np.abs(free).max()
+
+
+class Bent:
+    """An arm whose joints lead its tool by a matrix, and on which something presses wherever it is."""
+
+    JACOBIAN = np.array(
+        [[0.0, 0.5, 0.2, 0.1, 0.0, 0.0], [0.4, 0.0, 0.0, 0.0, 0.1, 0.0], [0.0, 0.3, -0.4, 0.1, 0.0, 0.0]]
+    )
+
+    def __init__(self, force_n: Vec3) -> None:
+        self.q, self.at, self.force_n = np.array(HOME), np.array([0.4, 0.0, 0.2]), force_n
+
+    def look(self) -> Seen:
+        return Seen(q_rad=tuple(self.q), tcp_m=tuple(self.at), force_n=self.force_n)
+
+    def meet(self, ask) -> None:
+        by_m = np.zeros(3)
+        if isinstance(ask, Write):
+            by_m = self.JACOBIAN @ (np.array(ask.q_rad) - self.q)
+        elif isinstance(ask.intent, Twist):
+            by_m = np.array(ask.intent.linear_m_s) * ARENA.tick_s * ask.n_ticks
+        self.q = self.q + np.linalg.pinv(self.JACOBIAN) @ by_m
+        self.at = self.at + by_m
+
+
+def weighed(*force_n: float) -> np.ndarray:
+    """Return how the tool went in each tick in which it was written to, once that had begun well."""
+    arm, steps = Bent(force_n), []
+    for ask in FAMILIES["gate_weighs"](arm.look, ARENA, np.random.default_rng(0)):
+        before = arm.at
+        arm.meet(ask)
+        steps += [arm.at - before] * isinstance(ask, Write)
+        if len(steps) == 60:
+            return np.array(steps[20:])
+    raise AssertionError("a stream never ends")
+
+
+def test_who_weighs_a_thing_down_goes_straight_down_and_slowly_once_it_bears():
+    free, borne, twice = weighed(0.0, 0.0, 5.0), weighed(0.0, 0.0, 20.0), weighed(0.0, 0.0, 40.0)
+    assert free[:, 2] == pytest.approx(-SINKING_M, rel=1e-6)
+    assert 0.0 < -borne[:, 2].min() < 0.1 * SINKING_M
+    assert twice == pytest.approx(2.0 * borne, abs=1e-9)
+    assert np.abs(np.concatenate([free, borne])[:, :2]).max() < 1e-9
+
+
+def test_who_weighs_a_thing_down_gives_way_to_what_pushes_aside():
+    pushed, harder = weighed(5.0, -5.0, 20.0)[:, :2], weighed(500.0, 0.0, 20.0)[:, :2]
+    assert pushed == pytest.approx(np.tile([5.0 * ASIDE_M_N, -5.0 * ASIDE_M_N], (40, 1)), rel=1e-6)
+    assert harder[:, 0] == pytest.approx(ASIDE_M, rel=1e-6)
 
 
 def test_a_hand_is_asked_for_less_than_the_least_and_more_than_the_most():

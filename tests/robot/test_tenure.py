@@ -44,6 +44,23 @@ def test_every_step_renews_the_lease(world):
     assert station.state.mode is StationMode.ENGAGED
 
 
+def test_a_source_that_says_that_it_is_there_in_time_keeps_its_lease_and_one_that_is_late_does_not(world):
+    station, _, host = world
+    for _ in range(5):
+        host.now_ns += LIFE_NS
+        station.renew_lease()
+    assert station.state.mode is StationMode.ENGAGED
+    host.now_ns += LIFE_NS + 1
+    station.renew_lease()
+    assert station.state.mode is StationMode.DISARMED
+
+
+def test_where_nobody_has_a_lease_there_is_none_to_renew():
+    station = build_station(fake_rig())
+    station.renew_lease()
+    assert (station.lease_number, station.state.mode) == (0, StationMode.DISARMED)
+
+
 def test_a_source_that_was_gone_for_longer_than_its_lease_finds_the_arm_stopped_and_disarmed(world):
     station, plant, host = world
     station.step(Twist(linear_m_s=(0.1, 0.0, 0.0)))
@@ -84,6 +101,27 @@ def test_a_hand_over_stops_the_arm_and_disarms(world):
     assert station.state.source == "learner"
 
 
+def test_who_keeps_the_lease_is_never_stopped(world):
+    station, plant, _ = world
+    n_stops = plant.arm.n_stops
+    for _ in range(3):
+        station.step(Hold())
+        assert station.state.mode is StationMode.ENGAGED
+    assert plant.arm.n_stops == n_stops
+
+
+def test_who_lets_go_of_the_lease_leaves_a_disarmed_arm_that_another_may_have(world):
+    station, _, _ = world
+    station.let_go()
+    assert (station.lease_number, station.state.mode) == (0, StationMode.DISARMED)
+    with pytest.raises(SafetyError, match="nobody has it"):
+        station.hand_over("learner")
+    station.take_lease("learner")
+    assert station.lease_number > 0
+    station.let_go()
+    station.let_go()
+
+
 def test_nobody_else_gets_the_lease_but_anybody_may_stop(world):
     station, plant, _ = world
     with pytest.raises(SafetyError, match="teleop has it"):
@@ -107,8 +145,17 @@ def test_a_stop_of_what_is_only_armed_disarms_it(world):
 
 def test_a_hand_over_of_nothing_is_refused():
     station = build_station(fake_rig())
-    with pytest.raises(SafetyError, match="nobody has it"):
+    with pytest.raises(SafetyError, match=r"^a hand-over: expected a source that has the lease, nobody has it$"):
         station.hand_over("learner")
+
+
+def test_who_took_over_keeps_the_lease_for_its_own_life_and_no_longer(world):
+    station, _, host = world
+    given = station.hand_over("learner", life_ns=LIFE_NS // 2)
+    host.now_ns += LIFE_NS // 2
+    assert station.lease_number == given.number
+    host.now_ns += 1
+    assert station.lease_number == 0
 
 
 @pytest.mark.parametrize(

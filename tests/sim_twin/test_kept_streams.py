@@ -4,10 +4,13 @@ import msgspec
 import pytest
 
 from config.loader import resolve
-from sim_twin.checking import command, kept
+from robot.teleop.wanted import Wanted
+from sim_twin.checking import command, kept, weakened
 from sim_twin.checking.check import Setup, part_of
-from sim_twin.checking.kept import KeptStreams, origin_of
+from sim_twin.checking.kept import KeptOutcomes, KeptStreams, origin_of
+from sim_twin.checking.mutations import Outcome
 from sim_twin.checking.ring import StreamResult
+from sim_twin.checking.weakenings import MUTATIONS
 from sim_twin.readings import Reading
 
 
@@ -94,3 +97,43 @@ def test_a_check_that_was_interrupted_runs_what_is_left_and_reports_all(setup, t
     blocks = part_of(setup, full=False)[:12]
     assert asked == [block.streams for block in blocks]
     assert next(r.value for r in report.results if r.name == "streams") == sum(b.n_streams for b in blocks)
+
+
+def told(limit, *, is_caught=True):
+    return Outcome(
+        limit=limit, true_margin_share=0.1, weakened_margin_share=-0.02, is_held=True, is_caught=is_caught,
+        family="steps", number=3,
+    )  # fmt: skip
+
+
+def test_limits_that_were_weakened_before_an_interruption_are_not_tried_again_and_all_are_reported(
+    setup, tmp_path, monkeypatch
+):
+    names, tried = [m.name for m in MUTATIONS], []
+
+    def run(coded, name):
+        assert msgspec.json.decode(coded, type=Setup).profile == setup.profile
+        tried.append(name)
+        if len(tried) == 4:
+            raise KeyboardInterrupt
+        return told(name, is_caught=name != names[-1])
+
+    monkeypatch.setattr(weakened, "run_mutation", run)
+    wanted = Wanted(mutate=True, out=tmp_path, n_workers=1)
+    with pytest.raises(KeyboardInterrupt):
+        weakened.weaken_each(setup.resolved, wanted)
+    answer = weakened.weaken_each(setup.resolved, wanted)
+    assert tried == [*names[:4], *names[3:]]
+    report = msgspec.json.decode(answer.json)
+    assert [(row["limit"], row["is_caught"]) for row in report["outcomes"]] == [(n, n != names[-1]) for n in names]
+    assert not answer.is_passed
+    assert msgspec.json.decode((tmp_path / "weakened.json").read_bytes()) == report
+
+
+def test_what_came_of_a_limit_under_other_limits_or_another_seed_is_not_taken(setup, tmp_path):
+    KeptOutcomes(tmp_path, setup).add(told("box"))
+    assert set(KeptOutcomes(tmp_path, setup).by_limit) == {"box"}
+    other = setup.resolved.limits.profile("attended")
+    assert KeptOutcomes(tmp_path, msgspec.structs.replace(setup, profile=other)).by_limit == {}
+    assert KeptOutcomes(tmp_path, msgspec.structs.replace(setup, seed=1)).by_limit == {}
+    assert KeptOutcomes(None, setup).by_limit == {}

@@ -121,7 +121,7 @@ def test_a_stream_alone_is_the_same_as_among_others(resolved):
 
 
 def test_a_stream_of_a_search_is_found_again(resolved):
-    setup = setup_of(resolved, n_commands=SHORT)
+    setup = setup_of(resolved, n_commands=10)
     block = next(b for b in part_of(setup, full=True) if b.search is not None)
     heard: list[StreamResult] = []
     check_streams(setup, (block,), n_workers=1, heard=heard.extend)
