@@ -6,6 +6,7 @@ from config.limited import limited
 from config.resolved import Resolved
 from config.rig import Rig
 from robot.bus import Bus, Role
+from robot.bus.errors import BusError
 from robot.bus.topics import ARM_STATE
 from robot.bus.twin_link import RemoteResetter, RemoteTruth
 from robot.errors import RobotConfigError
@@ -88,6 +89,8 @@ def build_lab_station(resolved: Resolved, perception: Perceives, *, is_driven: b
 def join_robot_node(resolved: Resolved, *, is_driven: bool = False) -> RemoteStation | None:
     """Return the station of the robot node on the rig's bus, disarmed for this process; None where there is none.
 
+    Where a person drives, and lays the table out too, there need be no bus either.
+
     Args:
         resolved: the rig, and the table that is expected there.
         is_driven: a person drives.
@@ -100,7 +103,12 @@ def join_robot_node(resolved: Resolved, *, is_driven: bool = False) -> RemoteSta
     if rig.bus is None:
         return None
     bus = Bus(rig.bus, serial=rig.expected.serial, role=Role.TELEOP if is_driven else Role.LEARNING, keys=rig.keys)
-    bus.open()
+    try:
+        bus.open()
+    except BusError:
+        if is_driven and rig.reset == "person":
+            return None  # nothing else of the rig runs: who drives holds the arm himself
+        raise
     try:
         asker = NodeAsker(bus, wait_s=AWAY_S, tell=lambda line: typer.echo(line, err=True))
         if not asker.is_anybody():

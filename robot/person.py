@@ -84,6 +84,8 @@ class TerminalPerson:
 
     def _awaited(self, meanwhile: Callable[[], object]) -> str:
         """Return the next line that is typed, empty where none can come any more."""
+        if sys.stdin is None:
+            return ""
         keyboard, typed = sys.stdin.fileno(), b""
         while b"\n" not in typed:
             meanwhile()
@@ -96,12 +98,12 @@ class TerminalPerson:
 
     def _forget_typed(self) -> None:
         """Forget what was typed before a question: it answered another one, which may be void by now."""
-        if self._meanwhile is None:
+        if sys.stdin is None or not (sys.stdin.isatty() or self._meanwhile):
             return
         keyboard = sys.stdin.fileno()
         if os.isatty(keyboard):
             termios.tcflush(keyboard, termios.TCIFLUSH)
-        while select.select([keyboard], [], [], 0.0)[0] and os.read(keyboard, 4096):
+        while self._meanwhile is not None and select.select([keyboard], [], [], 0.0)[0] and os.read(keyboard, 4096):
             pass
 
 

@@ -16,6 +16,9 @@ from robot.person import Person
 __all__ = ["PersonLook", "PersonResetter", "misplaced"]
 
 TOLERANCE_M = 0.01
+HIGH_M = 0.02
+"""A cylinder in a box stands on its floor."""
+UPRIGHT = math.cos(math.radians(15.0))
 MM = 1e3
 
 
@@ -28,6 +31,11 @@ class _Stops(Protocol):
 
     def await_rest(self) -> None:
         """Wait until an arm that was lost must be at rest."""
+        ...
+
+    @property
+    def why_lost(self) -> str | None:
+        """Why command was lost and not given up, None where it was given up."""
         ...
 
 
@@ -64,21 +72,33 @@ class PersonResetter:
         from robot.layout_picture import draw_picture  # brings matplotlib, which only a person needs
 
         draw_picture(self._scenario, layout, f"epoch {epoch}: where things belong (mm, base frame)", path)
-        request = f"the arm is disarmed; lay the table out for epoch {epoch}, seed {seed}, as in {path}"
-        while True:
+        request = f"{self._how_it_is()}; lay the table out for epoch {epoch}, seed {seed}, as in {path}"
+        is_laid_out = False
+        while not is_laid_out:
             self._person.await_key(request)
-            off = self._off(layout)
-            if not off:
-                break
-            for line in off:
-                self._person.tell(f"not in place: {line}")
             request = "put right what is not in place"
-        self._person.await_key("everything is in place; take your hands off the table, the arm moves next")
+            if self._is_in_place(layout):
+                self._person.await_key("everything is in place; take your hands off the table, the arm moves next")
+                is_laid_out = self._is_in_place(layout)
+
+    def _how_it_is(self) -> str:
+        """Return in words whether the arm was seen to be let go of."""
+        why = self._loop.why_lost
+        if why is None:
+            return "the arm is disarmed"
+        return f"NOT CONFIRMED that nothing runs on the arm ({why}): look at its pendant that no program does"
+
+    def _is_in_place(self, layout: Layout) -> bool:
+        """Look, and say what is not."""
+        off = self._off(layout)
+        for line in off:
+            self._person.tell(f"not in place: {line}")
+        return not off
 
     def _off(self, layout: Layout) -> list[str]:
         """Return in words what is not in place; a table that nobody sees is none."""
         try:
-            return misplaced(layout, self._scene.read())
+            return misplaced(layout, self._scene.read(), self._scenario)
         except WireError as error:
             return [f"nothing is perceived: {error}"]
 
@@ -102,8 +122,8 @@ class PersonLook:
         self._person.await_key("the arm is disarmed: see to what is wrong at the table, take your hands off it")
 
 
-def misplaced(layout: Layout, scene: SceneState) -> list[str]:
-    """Return in words what is more than 10 mm from where it was drawn, or not perceived."""
+def misplaced(layout: Layout, scene: SceneState, scenario: Scenario) -> list[str]:
+    """Return in words what is more than 10 mm from where it was drawn, lies, is held up, or is not perceived."""
     places = {thing.name: thing.position_m for thing in scene.objects}
     wanted = layout.fixtures_m | {name: standing.position_m for name, standing in layout.cylinders.items()}
     off = []
@@ -118,4 +138,21 @@ def misplaced(layout: Layout, scene: SceneState) -> list[str]:
                 f"{name}: {away_m * MM:.0f} mm off, belongs at {x * MM:.0f}, {y * MM:.0f}, is at {is_x * MM:.0f}, "
                 f"{is_y * MM:.0f}"
             )
+    return [*off, *_fallen(scene, scenario)]
+
+
+def _fallen(scene: SceneState, scenario: Scenario) -> list[str]:
+    """Return in words which loose cylinders do not stand at the height at which they would."""
+    heights_m = {c.name: scenario.table.height_m + c.height_m / 2 for c in scenario.cylinders}
+    off = []
+    for thing in scene.objects:
+        expected_m = heights_m.get(thing.name)
+        if expected_m is None:
+            continue
+        up = 1.0 - 2.0 * (thing.quat[1] ** 2 + thing.quat[2] ** 2)  # of its axis, along the vertical
+        high_m = thing.position_m[2] - expected_m
+        if abs(up) < UPRIGHT:
+            off.append(f"{thing.name}: must stand, it lies or leans")
+        elif abs(high_m) > HIGH_M:
+            off.append(f"{thing.name}: {high_m * MM:+.0f} mm off in height: what is under it?")
     return off

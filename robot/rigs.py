@@ -119,12 +119,12 @@ def find_station(
 ) -> "LocalStation | RemoteStation":
     """Return the station of a rig: of the robot node on its bus where there is one, else one of this process's own.
 
-    Where a person drives, and lays the table out too, it is this process's own, whose terminal he sits at. Ticks are
-    tapped in an own one only.
+    Where a person drives, lays the table out too and there is no robot node, it is this process's own, whose terminal
+    he sits at. Ticks are tapped in an own one only.
     """
     rig = resolved.rig
     check_usable(rig)
-    if rig.bus is not None and not (is_driven and rig.reset == "person"):
+    if rig.bus is not None:
         found = load("robot.lab:join_robot_node")(resolved, is_driven=is_driven)
         if found is not None:
             return found

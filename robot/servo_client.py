@@ -159,7 +159,6 @@ class ServoClient:
         """Take command of the arm; a process that has ended is started anew, and what was lost before is forgotten."""
         self.connect()
         self._told = self._why_lost = None
-        self._halt[0] = 0
         assert self._watch is not None, "connecting sets it"
         with self._taking.watched(end=self._watch.kill, is_gone=lambda: self._is_gone) as alarm:
             self._overhear()
@@ -187,8 +186,15 @@ class ServoClient:
             self._kill()
 
     def halt(self) -> None:
-        """Have the arm stopped and latched within a tick, from any thread, also amid a time step. Waits for nothing."""
+        """Have the arm stopped and latched within a tick, from any thread, also amid a time step. Waits for nothing.
+
+        Nobody takes the arm either, and a hand that is being activated is stopped, until `end_halt`.
+        """
         self._halt[0] = 1
+
+    def end_halt(self) -> None:
+        """Let the arm be taken again: the stop was carried out, and who armed it was told."""
+        self._halt[0] = 0
 
     def await_rest(self) -> None:
         """Wait until an arm that was lost must be at rest, by its process or its own watchdog; others rest already."""

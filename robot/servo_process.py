@@ -73,6 +73,7 @@ LOST = Reason.STALE_STATE.value
 ENDING_REASONS = (LOST, Reason.ARM_REFUSED.value, Reason.WIRE.value)
 """After these the process ends."""
 LOST_CODE = 3
+STOPPED = "somebody said stop over the bus"
 NOT_STOPPED = (
     "stop: expected the arm at rest and its program ended, nobody confirms it; its servo process has ended, look at "
     "the arm and at its pendant"
@@ -118,21 +119,10 @@ def serve(
     if isinstance(plant, Linked):
         plant.end_by(die)
         plant.tell_upload(partial(setitem, uploaded, 0, 1))
-
-    def latched(verdict: Verdict) -> None:
-        server.latched(verdict)
+        plant.heed(lambda: bool(halt[0]))
 
     notes = TickNotes(rate_hz=plant.arm.spec.rate_hz)
-    loop = TickLoop(
-        arm=plant.arm,
-        config=resolved.arm,
-        scenario=resolved.scenario,
-        rule_sets=resolved.rule_sets,
-        rig=resolved.rig,
-        profile=resolved.profile,
-        when_latched=latched,
-        tap=notes,
-    )
+    loop = _loop_of(resolved, plant, when_latched=lambda verdict: server.latched(verdict), notes=notes)
     server = ServoServer(
         connection=connection,
         plant=plant,
@@ -160,6 +150,15 @@ def serve(
     sys.stdout.flush()
     sys.stderr.flush()
     os._exit(code)
+
+
+def _loop_of(
+    resolved: Resolved, plant: Plant, *, when_latched: Callable[[Verdict], object], notes: TickNotes
+) -> TickLoop:
+    return TickLoop(
+        arm=plant.arm, config=resolved.arm, scenario=resolved.scenario, rule_sets=resolved.rule_sets, rig=resolved.rig,
+        profile=resolved.profile, when_latched=when_latched, tap=notes,
+    )  # fmt: skip
 
 
 class ServoServer:
@@ -248,7 +247,7 @@ class ServoServer:
     def _tick(self) -> None:
         assert self._grip is not None, "seeding sets it"
         if self._halt[0]:
-            self._loop.latch(Reason.STOP, "somebody said stop over the bus")
+            self._loop.latch(Reason.STOP, STOPPED)
             self._end_unless_stopped()
             return
         verdict = self._loop.tick(self._grip)
@@ -329,7 +328,9 @@ class ServoServer:
                 return Connected(identity=self._plant.identity)
             case Engage():
                 self._cpu.unpin()
+                self._heed()
                 self._loop.engage()
+                self._heed()
             case Seed():
                 return Seeded(state=self._seed())
             case Measure():
@@ -345,6 +346,12 @@ class ServoServer:
             case StrideRequest():
                 raise AssertionError("answered elsewhere")
         return Done()
+
+    def _heed(self) -> None:
+        """Take no arm that somebody said stop to. Raises SafetyError."""
+        if self._halt[0]:
+            self._plant.arm.stop()
+            raise SafetyError(STOPPED)
 
     def _seed(self) -> ArmState:
         self._sequence, self._answered_ns = 0, None

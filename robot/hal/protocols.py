@@ -142,3 +142,7 @@ class Linked(Protocol):
     def tell_upload(self, tell: Callable[[], object]) -> None:
         """Have `tell` called before the first thing is sent that the arm would run."""
         ...
+
+    def heed(self, is_stopped: Callable[[], bool]) -> None:
+        """Have this asked while command is taken, which takes seconds: somebody may say stop meanwhile."""
+        ...

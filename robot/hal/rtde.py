@@ -7,7 +7,7 @@ reconnect: the controller's watchdog stops the arm, and the process has to end. 
 between engaging and the first command, and while the arm is stopped.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable
 from contextlib import suppress
 from time import monotonic_ns
 
@@ -17,11 +17,11 @@ from rtde_receive import RTDEReceiveInterface
 from config.arm import ArmConfig
 from config.cell import CellConfig
 from robot.errors import ArmRefusedError, NotEngagedError, StaleStateError, WireError
-from robot.geometry import quat_of_rotation_vector
+from robot.geometry import quat_of_rotation_vector, vec6
 from robot.hal.pins import Pins
 from robot.hal.protocols import Clock
 from robot.hal.robotiq import GripScale, RobotiqGripper
-from robot.hal.rtde_clock import RtdeClock
+from robot.hal.rtde_clock import HeedingClock, RtdeClock
 from robot.hal.rtde_command import ALL_BITS, RATE_HZ, TAKE_S, Readers, RtdeCommand
 from robot.hal.rtde_links import RtdeLinks
 from robot.hal.rtde_outputs import N_OUTPUTS
@@ -37,7 +37,7 @@ from robot.hal.ur_state import (
     why_refused,
     why_slowed,
 )
-from robot.messages import ArmCommand, ArmMode, ArmSpec, ArmState, GripState, Vec6
+from robot.messages import ArmCommand, ArmMode, ArmSpec, ArmState, GripState
 
 __all__ = ["RtdeArm"]
 
@@ -75,8 +75,8 @@ class RtdeArm:
         joints = arm.joints
         self.spec = ArmSpec(
             model=arm.name, rate_hz=RATE_HZ, n_inputs=N_OUTPUTS, n_outputs=N_OUTPUTS,
-            q_min_rad=_vec6([j.range_rad[0] for j in joints]), q_max_rad=_vec6([j.range_rad[1] for j in joints]),
-            qd_max_rad_s=_vec6([j.speed_rad_s for j in joints]), grip_stroke_m=arm.tool.stroke_m,
+            q_min_rad=vec6([j.range_rad[0] for j in joints]), q_max_rad=vec6([j.range_rad[1] for j in joints]),
+            qd_max_rad_s=vec6([j.speed_rad_s for j in joints]), grip_stroke_m=arm.tool.stroke_m,
         )  # fmt: skip
         self._pace = RtdeClock()
         self.clock: Clock = self._pace
@@ -99,6 +99,7 @@ class RtdeArm:
         self._modes, self._mode = (-1, 0), mode_of(-1, 0)
         self._outputs_read = 0
         self._is_hand_asked = False
+        self.is_stopped: Callable[[], bool] = lambda: False
 
     # ----------------------------------------------------------------------------------------------------- acquire
 
@@ -150,7 +151,7 @@ class RtdeArm:
             raise
         try:
             with named("RTDE control", self.address):
-                self._command.take(self.clock)
+                self._command.take(HeedingClock(self.clock, self._heed_stop))
         except BaseException:
             # An arm that was set up by half is nobody's: the next engage begins anew.
             self._require_link()
@@ -367,8 +368,14 @@ class RtdeArm:
     def _see_running(self) -> None:
         """Wait a tick and look at arm and hand; where the arm may not move the hand may not either."""
         self.clock.wait_tick()
+        self._heed_stop()
         if self.read().mode is not ArmMode.RUNNING:
             raise ArmRefusedError(f"hand: its activation was broken off: {why_refused(self.status())}")
+
+    def _heed_stop(self) -> None:
+        """Raise ArmRefusedError where somebody said stop while command is taken."""
+        if self.is_stopped():
+            raise ArmRefusedError("arm: somebody said stop while command was taken: nothing is begun")
 
     def _refuse(self, what: str) -> None:
         require(False, what, receive=self._reading()[0], clock=self.clock)
@@ -386,8 +393,3 @@ class RtdeArm:
                 if max(abs(v) for v in receive.getActualQd()) < STILL_RAD_S:
                     return True
         return False
-
-
-def _vec6(values: Sequence[float]) -> Vec6:
-    a, b, c, d, e, f = values
-    return a, b, c, d, e, f

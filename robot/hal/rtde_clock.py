@@ -1,13 +1,15 @@
 """Wall time on the client's own pacing."""
 
+from collections.abc import Callable
 from time import monotonic_ns
 from typing import Any
 
 from rtde_receive import RTDEReceiveInterface
 
 from robot.errors import StaleStateError
+from robot.hal.protocols import Clock
 
-__all__ = ["TICK_NS", "RtdeClock"]
+__all__ = ["TICK_NS", "HeedingClock", "RtdeClock"]
 
 TICK_NS = 2_000_000
 
@@ -40,3 +42,25 @@ class RtdeClock:
         n_missed = max(0, (now_ns - self._due_ns) // TICK_NS)
         self._due_ns = now_ns + TICK_NS
         return int(n_missed)
+
+
+class HeedingClock:
+    """A clock that looks at something after each tick.
+
+    Args:
+        clock: whose ticks.
+        look: raises where nobody may wait on.
+    """
+
+    def __init__(self, clock: Clock, look: Callable[[], object]) -> None:
+        self._clock, self._look = clock, look
+
+    def now_ns(self) -> int:
+        """Return the clock's time in nanoseconds."""
+        return self._clock.now_ns()
+
+    def wait_tick(self) -> int:
+        """Wait for the clock's next tick, look, and return how many ticks were missed."""
+        n_missed = self._clock.wait_tick()
+        self._look()
+        return n_missed

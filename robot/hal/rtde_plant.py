@@ -65,6 +65,10 @@ class RtdePlant:
         """Have this called before a program is uploaded."""
         self.arm.links.when_uploading = tell
 
+    def heed(self, is_stopped: Callable[[], bool]) -> None:
+        """Have this asked all the while command is taken and a hand activated."""
+        self.arm.is_stopped = is_stopped
+
     def observer(self) -> UrObserver:
         """Return somebody who looks at the arm by clients that cannot move it."""
         return UrObserver(arm=self._config, address=self._address, serial=self._serial, pins=Pins(self._cell))

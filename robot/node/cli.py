@@ -1,11 +1,14 @@
 """`autotelic node`: one process of a rig, as `autotelic up` starts it. The edge."""
 
+import sys
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from config.loader import resolve
+from config.rig import Rig
+from robot.errors import SafetyError
 from robot.rigs import load
 from robot.stop_request import StopRequest
 
@@ -48,9 +51,20 @@ def robot(
     from robot.node.lab_node import open_robot_node  # brings the bus and the arm's client
 
     resolved = resolve(rig=rig, scenario=scenario)
+    _require_terminal(resolved.rig)
     with StopRequest() as end, open_robot_node(resolved, pictures=pictures) as node:
         typer.echo(f"robot node of {resolved.rig.name}: disarmed, waits for a source at {resolved.rig.bus}", err=True)
         node.run(end)
+
+
+def _require_terminal(rig: Rig) -> None:
+    """Raise SafetyError where a person is needed at a real arm, and none can be at this process's input."""
+    is_terminal = sys.stdin is not None and sys.stdin.isatty()
+    if rig.reset == "person" and rig.expected.kind == "real" and not is_terminal:
+        raise SafetyError(
+            f"rig {rig.name}: expected a person at a terminal, beside the arm; standard input is none. Nothing was "
+            "connected to, nothing moves"
+        )
 
 
 @app.command()

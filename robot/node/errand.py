@@ -13,15 +13,17 @@ from robot.bus.station_rows import (
     ArmableWork,
     ClearLatch,
     Engage,
+    Failed,
     LayOut,
     ResetPlant,
     StationAsk,
     StationReport,
     StationTold,
 )
+from robot.errors import BugError, RobotError
 from robot.safety import Armable
 
-__all__ = ["AtTheArm", "Errand", "is_errand", "is_his"]
+__all__ = ["AtTheArm", "Errand", "failed_by", "is_errand", "is_his"]
 
 
 class AtTheArm(Protocol):
@@ -58,6 +60,12 @@ def is_his(work: ArmableWork, station: Armable, person: AtTheArm) -> bool:
         case _:
             return False
     return True
+
+
+def failed_by(error: RobotError) -> Failed:
+    """Return an error as it crosses the bus."""
+    assert not isinstance(error, BugError), str(error)
+    return Failed(kind=type(error).__name__, message=str(error))
 
 
 class Errand:

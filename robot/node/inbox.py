@@ -109,10 +109,10 @@ class Inbox:
             self._came.notify_all()
 
     def _take_stop(self, received: Received[StopAsk]) -> None:
-        self._halt()
         with self._came:
             self._stops.append(received.message)
             self._came.notify_all()
+        self._halt()  # after it: whoever ends a halt looks for a stop that came meanwhile
 
     def _hear(self, received: Received[Beat]) -> None:
         deadline_s, age_ns = BEAT.deadline_s, received.age_ns

@@ -9,6 +9,8 @@ from pathlib import Path
 from time import sleep
 from typing import TypeVar
 
+import typer
+
 from config.limited import limited
 from config.resolved import Resolved
 from robot.bus import Bus, Role
@@ -81,6 +83,8 @@ def open_robot_node(resolved: Resolved, *, pictures: Path = Path("resets")) -> G
             profile=rig.profile,
             drive=drive,
             halt=loop.halt,
+            end_halt=loop.end_halt,
+            say=lambda text: typer.echo(text, err=True),
             take_notes=loop.take_notes,
             is_perceiving=not is_fed(rig),
             is_attended=is_armed_by_person or rig.reset == "person",

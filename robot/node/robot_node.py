@@ -37,10 +37,10 @@ from robot.bus.station_rows import (
     TakeLease,
 )
 from robot.bus.topics import ARM_STATE, ASK, INTENT, LAY_OUT, PERCEPT, REPORT, REQUESTED, SENT, STEP, VERDICT
-from robot.errors import BugError, NotEngagedError, RobotError, SafetyError
+from robot.errors import NotEngagedError, RobotError, SafetyError
 from robot.messages import ArmState, Percept, StepResult
 from robot.node.admission import Admission
-from robot.node.errand import AtTheArm, Errand, is_errand, is_his
+from robot.node.errand import AtTheArm, Errand, failed_by, is_errand, is_his
 from robot.node.inbox import Inbox, Refused
 from robot.node.pulse import Pulse
 from robot.node.served import ServedStation
@@ -67,8 +67,10 @@ class RobotNode:
         profile: of the limits.
         drive: has the station's hand do what it is asked (True), or decide by itself (False).
         halt: told of a stop at once, on the bus's thread, for an arm that is held in another process.
+        end_halt: told once every stop was carried out.
         take_notes: returns what ticks of the last time step asked for, thinned.
         is_perceiving: percepts are this process's own, and told by it.
+        say: tells a person at this process's terminal.
         is_attended: what is asked for may take as long as a person at the arm needs for it.
         person: arms this arm, and nobody else does; None where whoever has the lease may, for nothing can be hurt.
         now_ns: this process's monotonic clock.
@@ -80,17 +82,19 @@ class RobotNode:
     def __init__(
         self, bus: Bus, station: ServedStation, *, scenario: str, profile: str,
         drive: Callable[[bool], object] = lambda _: None, halt: Callable[[], object] = lambda: None,
-        take_notes: Callable[[], tuple[TickNote, ...]] = tuple, is_perceiving: bool = True,
-        is_attended: bool = False, person: AtTheArm | None = None, now_ns: Callable[[], int] = monotonic_ns,
+        end_halt: Callable[[], object] = lambda: None, take_notes: Callable[[], tuple[TickNote, ...]] = tuple,
+        is_perceiving: bool = True, say: Callable[[str], object] = lambda _: None, is_attended: bool = False,
+        person: AtTheArm | None = None, now_ns: Callable[[], int] = monotonic_ns,
     ) -> None:  # fmt: skip
         self._station, self._scenario, self._profile = station, scenario, profile
         self._drive, self._take_notes, self._now_ns = drive, take_notes, now_ns
-        self._is_attended, self._person, self._errand = is_attended, person, Errand()
+        self._say, self._is_attended, self._person, self._errand = say, is_attended, person, Errand()
         self._is_over: Callable[[], bool] = lambda: False
         self.pulse = Pulse(now_ns=now_ns)
         assert INTENT.deadline_s is not None, "an intent grows old"
         self._admission = Admission(max_age_ns=round(INTENT.deadline_s * 1e9), now_ns=now_ns)
         self._inbox = Inbox(bus, self._admission, halt=halt)
+        self._halt, self._end_halt = halt, end_halt
         self._answerers = bus.answerer(ASK), bus.answerer(LAY_OUT)
         self._steps, self._reports = bus.publisher(STEP), bus.publisher(REPORT)
         self._states, self._percepts = bus.publisher(ARM_STATE), bus.publisher(PERCEPT) if is_perceiving else None
@@ -144,7 +148,8 @@ class RobotNode:
         """See to what cannot wait while a person at the arm is waited for, or the arm is on its way to and from him.
 
         Raises:
-            SafetyError: what he is waited for is void: somebody said stop, who asked has gone, or this node ends.
+            SafetyError: what he is waited for is void: somebody said stop, or this node ends.
+            NotEngagedError: who asked has gone.
         """
         self.pulse.beat()
         if self._carry_out_stops():
@@ -159,7 +164,7 @@ class RobotNode:
         if self._is_over():
             raise SafetyError("this robot node ends: what a person at the arm was asked for is void")
         if not self._station.lease_number:
-            raise SafetyError("who asked a person at the arm for it has gone: it is void")
+            raise NotEngagedError("who asked a person at the arm for it has gone: it is void")
 
     @property
     def is_stop_due(self) -> bool:
@@ -185,6 +190,10 @@ class RobotNode:
         while asked is not None:
             self._stop(asked)
             asked = self._inbox.stop()
+        if is_any:
+            self._end_halt()
+            if self._inbox.has_stop:  # it came just now: whatever is begun next must still find it
+                self._halt()
         return is_any
 
     def _stop(self, asked: StopAsk) -> None:
@@ -205,7 +214,7 @@ class RobotNode:
         try:
             result = self._station.step(command.intent, duration_s=command.duration_s)  # pyright: ignore[reportArgumentType] - the gate refuses what is no intent
         except RobotError as error:
-            self._publish_step(command, failed=_failed(error))
+            self._publish_step(command, failed=failed_by(error))
             return
         measured = self._station.measured
         self._publish_step(command, result=result, measured=measured)
@@ -256,7 +265,10 @@ class RobotNode:
             self._errand.begin(request)
             asked.answer(self._errand.told(self._report()))
             self.pulse.doing = f"waits for a person at the arm: {self._errand.what}"
-            self._errand.end(self._outcome(request))
+            told = self._outcome(request)
+            self._errand.end(told)
+            if told.failed is not None:
+                self._say(f"that is void now: {told.failed.message}")
         else:
             asked.answer(self._outcome(request))
 
@@ -267,7 +279,7 @@ class RobotNode:
         if isinstance(request.work, Describe | Release):
             return self._outcome(request)
         busy = SafetyError(f"robot node: it waits for a person at the arm ({self._errand.what}); ask again after that")
-        return StationTold(report=self._report(), failed=_failed(busy))
+        return StationTold(report=self._report(), failed=failed_by(busy))
 
     def _has_turn(self, request: StationAsk) -> bool:
         return self._admission.why_no_turn(request.lease, request.number) is None
@@ -277,7 +289,7 @@ class RobotNode:
             return self._obey(request)
         except RobotError as error:
             self.pulse.fail(f"{type(request.work).__name__}: {error}")
-            return StationTold(report=self._report(), failed=_failed(error))
+            return StationTold(report=self._report(), failed=failed_by(error))
 
     def _obey(self, request: StationAsk) -> StationTold:
         work = request.work
@@ -385,8 +397,3 @@ class RobotNode:
             publisher.put(message)
         except BusError as error:
             self.pulse.fail(str(error))
-
-
-def _failed(error: RobotError) -> Failed:
-    assert not isinstance(error, BugError), str(error)
-    return Failed(kind=type(error).__name__, message=str(error))

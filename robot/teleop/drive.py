@@ -13,12 +13,14 @@ from rich.console import Console
 from config.loader import resolve
 from config.resolved import Resolved
 from robot.errors import RobotConfigError, RobotError
+from robot.local_station import LocalStation
 from robot.messages import StationMode, StationState
+from robot.operated import AskingOperator, operator_of
 from robot.person import PersonOperator, TerminalPerson
 from robot.recording.messages import Purpose
 from robot.recording.recording import UNNAMED, Recording
-from robot.rigs import build_operator, build_shadow, build_view, find_station
-from robot.safety import Armable
+from robot.rigs import build_shadow, build_view, find_station
+from robot.safety import Armable, Operator
 from robot.stop_request import StopRequest
 from robot.teleop.device import open_device
 from robot.teleop.driver import DriveEnd, DrivenStation, Driver, DriveView, Pace, Unpaced
@@ -152,7 +154,7 @@ class Rearm:
         if not self._is_person:
             return False
         self._readout.pause()
-        operator = PersonOperator(TerminalPerson())
+        operator = self._operator(state)
         if state.mode is StationMode.LATCHED:
             self._n_resets += 1
             operator.rearm(self._station, seed=self._seed, epoch=self._n_resets)
@@ -160,6 +162,13 @@ class Rearm:
             operator.arm_once(self._station)
         self._readout.go_on()
         return True
+
+    def _operator(self, state: StationState) -> Operator:
+        """Return who arms it: whoever sits here, or who holds the arm elsewhere, once somebody here has looked."""
+        if isinstance(self._station, LocalStation):
+            return PersonOperator(TerminalPerson())
+        TerminalPerson().await_key(f"the arm was stopped ({state.reason}): find out why, and see to it")
+        return AskingOperator()
 
 
 def _open_recording(resolved: Resolved, options: DriveOptions, stack: ExitStack) -> Recording | None:
@@ -177,7 +186,7 @@ def _open_recording(resolved: Resolved, options: DriveOptions, stack: ExitStack)
 
 def _arm(station: DrivenArm, driven: DrivenStation, resolved: Resolved, *, seed: int) -> None:
     """Let the rig's operator arm the station, and a twin lay its table out."""
-    operator = build_operator(resolved.rig) or PersonOperator()
+    operator = operator_of(station, resolved.rig) or PersonOperator()
     operator.arm_once(station)
     if resolved.rig.reset == "twin":
         driven.reset(seed=seed, epoch=0)

@@ -1,5 +1,6 @@
 """A person's reset in lock-step: parked, let go of, checked against the drawing, and on to the drawn start."""
 
+import math
 from types import SimpleNamespace
 
 import numpy as np
@@ -7,14 +8,15 @@ import pytest
 
 from config.loader import resolve
 from perception.ground_truth import GroundTruthPerception
-from robot.errors import NotEngagedError
-from robot.messages import Heading
+from robot.errors import NotEngagedError, SafetyError
+from robot.messages import Heading, ObjectPose, SceneState
 from robot.person_reset import PersonResetter, misplaced
 from robot.person_station import PersonResetStation
 from robot.rigs import build_plant
 from robot.tick_loop import TickLoop
 
 SEED, EPOCH = 7, 0
+SCENARIO = resolve().scenario
 
 
 class ScriptedPerson:
@@ -23,6 +25,7 @@ class ScriptedPerson:
     def __init__(self, plant, home_rad):
         self.plant, self.home_rad = plant, np.array(home_rad)
         self.asked, self.told, self.away_rad = [], [], []
+        self.at_key = lambda n: None
 
     def tell(self, text):
         self.told.append(text)
@@ -33,6 +36,7 @@ class ScriptedPerson:
             self.away_rad.append(np.abs(np.array(self.plant.arm.read().q_rad) - self.home_rad).max())
         if len(self.asked) == 2:
             self.plant.resetter.reset(seed=SEED, epoch=EPOCH, digital_out=self.plant.arm.read().digital_out)
+        self.at_key(len(self.asked))
 
 
 @pytest.fixture
@@ -85,10 +89,59 @@ def test_a_thing_is_in_place_within_ten_millimetres(lab):
     layout = resetter.layout_of(seed=SEED, epoch=EPOCH)
     person.plant.resetter.reset(seed=SEED, epoch=EPOCH, digital_out=0)
     scene = person.plant.truth.read()
-    assert misplaced(layout, scene) == []
+    assert misplaced(layout, scene, SCENARIO) == []
     for away_m, n_off in ((0.0095, 0), (0.0105, 1)):
         x, y = layout.fixtures_m["green_button"]
         shifted = layout.fixtures_m | {"green_button": (x + away_m, y)}
         moved = type(layout)(fixtures_m=shifted, cylinders=layout.cylinders, start_m=layout.start_m)
-        assert len(misplaced(moved, scene)) == n_off
-    assert misplaced(layout, type(scene)(stamp_ns=0, objects=scene.objects[1:]))[0].endswith("not perceived")
+        assert len(misplaced(moved, scene, SCENARIO)) == n_off
+    assert misplaced(layout, type(scene)(stamp_ns=0, objects=scene.objects[1:]), SCENARIO)[0].endswith("not perceived")
+
+
+@pytest.mark.parametrize(
+    ("change", "word"),
+    [
+        (lambda p, q: (p, (math.cos(math.pi / 4), math.sin(math.pi / 4), 0.0, 0.0)), "must stand"),
+        (lambda p, q: ((p[0], p[1], p[2] + 0.3), q), "in height"),
+        (lambda p, q: ((p[0], p[1], p[2] + 0.019), q), ""),
+    ],
+)
+def test_a_cylinder_that_lies_or_stands_on_something_is_not_in_place(lab, change, word):
+    _, resetter, person, _ = lab
+    layout = resetter.layout_of(seed=SEED, epoch=EPOCH)
+    person.plant.resetter.reset(seed=SEED, epoch=EPOCH, digital_out=0)
+    scene = person.plant.truth.read()
+    changed = []
+    for thing in scene.objects:
+        place, turn = thing.position_m, thing.quat
+        if thing.name == "red_cylinder":
+            place, turn = change(place, turn)
+        changed.append(ObjectPose(name=thing.name, position_m=place, quat=turn))
+    off = misplaced(layout, SceneState(stamp_ns=0, objects=tuple(changed)), SCENARIO)
+    assert [word in line and "red_cylinder" in line for line in off] == ([True] if word else [])
+
+
+def test_what_is_moved_after_it_was_in_place_is_seen_before_the_arm_moves(lab):
+    station, _, person, _ = lab
+    station.arm(by="the test")
+    station.engage()
+
+    def meddle(n):
+        if n in (3, 5):  # 3: "hands off"; then he is asked to put it right, and again
+            person.plant.resetter.reset(seed=SEED + (n == 3), epoch=EPOCH, digital_out=0)
+        elif n == 4:
+            person.plant.resetter.reset(seed=SEED, epoch=EPOCH, digital_out=0)
+
+    person.at_key = meddle
+    station.reset(seed=SEED, epoch=EPOCH)
+    assert ["hands off" in text or "hands" in text for text in person.asked] == [False, False, True, False, True]
+
+
+def test_a_stop_that_nobody_confirmed_is_not_called_disarmed(lab, monkeypatch):
+    station, _, person, _ = lab
+    station.arm(by="the test")
+    station.engage()
+    monkeypatch.setattr(TickLoop, "why_lost", property(lambda self: "stop: nobody confirms it"))
+    with pytest.raises(SafetyError):
+        station._by_person.reset(seed=SEED, epoch=EPOCH, digital_out=0) or station._require_command()
+    assert person.asked[0].startswith("NOT CONFIRMED")

@@ -150,6 +150,9 @@ def test_a_stop_in_shared_memory_latches_at_the_next_tick(served):
     assert (told.stride.verdict.reason, told.stride.verdict.is_latched) == ("stop", True)
     assert told.is_asked
     assert isinstance(served.ask(Stop()), Done)
+    refused = served.ask(Engage())
+    assert isinstance(refused, Failure)
+    assert (refused.kind, refused.is_end) == ("SafetyError", False), "nobody takes it before the stop was carried out"
     served.halt[0] = 0
     assert isinstance(served.ask(Engage()), Done)
     assert isinstance(served.ask(Seed()), Seeded)

@@ -23,6 +23,7 @@ class Node:
         self.local = build_station(rig, tap=notes)
         self.bus = Bus(endpoint, serial=SERIAL, role=Role.ROBOT, is_hub=is_hub)
         self.bus.open()
+        self.said = []
         self.n_halts, self.is_over = 0, threading.Event()
         self.node = RobotNode(
             self.bus,
@@ -32,6 +33,7 @@ class Node:
             drive=self.drive,
             halt=self.halt,
             take_notes=notes.take,
+            say=self.said.append,
             is_attended=person is not None,
             person=person,
         )

@@ -9,7 +9,7 @@ from types import SimpleNamespace
 import pytest
 
 from robot.bus import Bus, Role
-from robot.errors import SafetyError
+from robot.errors import RobotError, SafetyError
 from robot.messages import StationMode
 from robot.node import NodeAsker, RemoteStation, StopCaller
 from robot.operated import AskingOperator
@@ -83,10 +83,10 @@ def arming(station):
     def run():
         try:
             AskingOperator().arm_once(station)
-        except SafetyError as error:
+        except RobotError as error:
             came.append(str(error))
 
-    thread = threading.Thread(target=run)
+    thread = threading.Thread(target=run, daemon=True)
     thread.start()
     return thread, came
 
@@ -121,6 +121,7 @@ def test_a_stop_voids_it_whatever_the_person_says_afterwards(lab):
     caller.close()
     thread.join()
     assert "somebody said stop" in came[0]
+    assert any("void" in line for line in lab.node.said), "he who is asked must read it too"
     lab.person.agrees.set()
     assert lab.node.local.state.mode is StationMode.DISARMED
 
@@ -133,6 +134,13 @@ def test_who_asked_and_has_gone_is_waited_for_no_longer(lab):
     thread.join()
     assert "has gone" in came[0]
     assert lab.node.local.state.mode is StationMode.DISARMED
+
+
+def test_a_robot_node_that_ends_voids_it(lab):
+    arming(lab.join())
+    until(lambda: lab.person.asked)
+    lab.node.is_over.set()
+    until(lambda: any("this robot node ends" in line for line in lab.node.said))
 
 
 def test_a_latch_is_looked_into_and_cleared_by_the_person_alone(lab):

@@ -30,7 +30,7 @@ def latched(monkeypatch):
         code = re.search(r"the code is (\d{4})", said[-1])
         return f"{code[1]}\n" if code else "\n"
 
-    monkeypatch.setattr(sys, "stdin", SimpleNamespace(readline=readline))
+    monkeypatch.setattr(sys, "stdin", SimpleNamespace(readline=readline, isatty=lambda: False))
     yield station, said, typed
     station.close()
 
@@ -53,7 +53,7 @@ def test_a_person_looks_types_the_code_and_presses_a_key(latched):
 
 def test_a_wrong_word_leaves_it_latched(latched, monkeypatch):
     station, _, _ = latched
-    monkeypatch.setattr(sys, "stdin", SimpleNamespace(readline=lambda: "yes\n"))
+    monkeypatch.setattr(sys, "stdin", SimpleNamespace(readline=lambda: "yes\n", isatty=lambda: False))
     with pytest.raises(SafetyError, match="the code that the cell shows"):
         rearm(station)
     assert station.state.mode is StationMode.LATCHED
@@ -61,7 +61,7 @@ def test_a_wrong_word_leaves_it_latched(latched, monkeypatch):
 
 def test_where_the_input_has_ended_it_stays_latched(latched, monkeypatch):
     station, _, _ = latched
-    monkeypatch.setattr(sys, "stdin", SimpleNamespace(readline=lambda: ""))
+    monkeypatch.setattr(sys, "stdin", SimpleNamespace(readline=lambda: "", isatty=lambda: False))
     with pytest.raises(SafetyError, match="the input has ended"):
         rearm(station)
     assert station.state.mode is StationMode.LATCHED

@@ -25,6 +25,8 @@ REASONS = {
     "joints": "tracking",
     "servo": "stale_state",
     "program": "arm_refused",
+    "tool": "arm_refused",
+    "payload": "arm_refused",
 }
 
 
