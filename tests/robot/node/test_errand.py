@@ -136,6 +136,7 @@ def test_who_asked_and_has_gone_is_waited_for_no_longer(lab):
     assert lab.node.local.state.mode is StationMode.DISARMED
 
 
+@pytest.mark.slow
 def test_a_robot_node_that_ends_voids_it(lab):
     arming(lab.join())
     until(lambda: lab.person.asked)
