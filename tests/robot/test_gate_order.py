@@ -160,6 +160,7 @@ def test_a_verdict_is_whole():
 
 
 def test_the_last_command_sent_is_kept_and_a_refused_one_is_not():
+    assert made(seeded=False).sent is None
     gate = made()
     assert gate.sent is None
     sent = command(START)
