@@ -120,7 +120,7 @@ def _driven_station(resolved: Resolved, perception: Perceives) -> LocalStation:
     bus = None if rig.bus is None or not is_fed(rig) else _robots_bus(rig, rig.bus)
     loop = ServoClient(resolved) if bus is None else ServoClient(resolved, when_closed=bus.close)
     if bus is not None:
-        perception = RemotePerception(bus, resolved.scenario, tell=bus.publisher(ARM_STATE).put)
+        perception = RemotePerception(bus, resolved.scenario, tell=bus.publisher(ARM_STATE).put, measure=loop.measure)
     world = LabWorld(loop=loop, truth=None, resetter=PersonLook(loop=loop, person=TerminalPerson()))
     return LocalStation(
         world=world, loop=loop, perception=perception, arm=arm, scenario=resolved.scenario, rig=rig,
