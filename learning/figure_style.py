@@ -22,6 +22,7 @@ __all__ = [
     "learner_styles",
     "mark_changes",
     "save",
+    "spread_widths",
     "styles",
 ]
 

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from config.loader import load_learning
+from learning import figure_style
 from learning.curves import over_optimum_curve, success_curve
 from learning.figures_compared import epochs_figure, improvement_figure, learners_figure
 from learning.page import differences
@@ -73,7 +74,8 @@ def test_the_first_learner_is_drawn_against_the_others(runs):
     assert "toy (3)" in lines
 
 
-def test_the_page_stands_alone_with_every_figure_in_it(runs, tmp_path):
+def test_the_page_stands_alone_with_every_figure_in_it(runs, tmp_path, monkeypatch):
+    monkeypatch.setattr(figure_style, "FORMATS", ("svg",))
     config = {"toy": load_learning("default"), "<hopeless>": load_learning("no_hazard")}
     write_report(runs, tmp_path, learners=config)
     page = (tmp_path / "report.html").read_text()
