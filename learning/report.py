@@ -1,11 +1,11 @@
 """Runs read back from their folders and put side by side: figures of merit over seeds, grouped by learner. Pure."""
 
-import math
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from itertools import combinations
 from pathlib import Path
 from statistics import median
+from typing import TypeVar
 
 import msgspec
 import numpy as np
@@ -15,7 +15,7 @@ from learning.metrics import EraSummary, Summary, summarise
 from learning.rows import EvaluationRow, GoalRow
 from learning.run_folder import Manifest, RunFolder
 from learning.run_search import find_runs
-from learning.statistics import Interval, interval_of, probability_of_improvement
+from learning.statistics import Interval, Reached, interval_of, probability_of_improvement, reached_by_half
 from learning.stops import Stops
 
 __all__ = [
@@ -34,7 +34,7 @@ __all__ = [
     "report_of",
 ]
 
-Z_95 = 1.959964
+Part = TypeVar("Part")
 
 
 class Run(msgspec.Struct, frozen=True, kw_only=True):
@@ -103,6 +103,8 @@ class EraReport(msgspec.Struct, frozen=True, kw_only=True):
     """Runs of the group that came to these rules: all that follows is of so many."""
     learnt: Count
     learnt_after: Spread
+    learnt_by_half: Reached | None = None
+    """Median over all runs, those that never learnt counting as later than all; None of fewer runs than three."""
     graph_right: Count | None
     """None where no run learns a graph."""
     graph_right_after: Spread
@@ -123,6 +125,8 @@ class GroupReport(msgspec.Struct, frozen=True, kw_only=True):
     name: str
     seeds: tuple[int, ...]
     eras: tuple[EraReport, ...]
+    time_steps_to_all: Spread | None = None
+    """Decisions while learning until every goal was learnt under the first rules."""
 
 
 class Comparison(msgspec.Struct, frozen=True, kw_only=True):
@@ -265,6 +269,7 @@ def _report_group(group: Group, rng: np.random.Generator | None) -> GroupReport:
         name=group.name,
         seeds=tuple(run.manifest.seed for run in group.runs),
         eras=tuple(_report_era(parts, rng) for parts in _eras(group)),
+        time_steps_to_all=_spread([run.summary for run in group.runs], rng, lambda summary: summary.time_steps_to_all),
     )
 
 
@@ -301,6 +306,7 @@ def _report_era(parts: Sequence[EraSummary], rng: np.random.Generator | None) ->
         n_runs=len(parts),
         learnt=count(sum(part.learnt_after is not None for part in parts), len(parts)),
         learnt_after=spread(lambda part: part.learnt_after),
+        learnt_by_half=None if rng is None else reached_by_half([part.learnt_after for part in parts], rng=rng),
         graph_right=count(sum(part.graph_right_after is not None for part in parts), len(parts)) if has_graph else None,
         graph_right_after=spread(lambda part: part.graph_right_after),
         graph_wrong_later=spread(lambda part: part.graph_wrong_later),
@@ -311,9 +317,7 @@ def _report_era(parts: Sequence[EraSummary], rng: np.random.Generator | None) ->
     )
 
 
-def _spread(
-    parts: Sequence[EraSummary], rng: np.random.Generator | None, figure: Callable[[EraSummary], float | None]
-) -> Spread:
+def _spread(parts: Sequence[Part], rng: np.random.Generator | None, figure: Callable[[Part], float | None]) -> Spread:
     values = [value for part in parts if (value := figure(part)) is not None]
     return Spread(
         median=median(values) if values else None,
@@ -329,7 +333,7 @@ def count(n: int, of: int) -> Count:
     """Return a count with Wilson's 95 % interval of its share."""
     if of == 0:
         return Count(n=0, of=0, share_low=0.0, share_high=1.0)
-    share, z2 = n / of, Z_95**2
-    centre = (share + z2 / (2 * of)) / (1 + z2 / of)
-    half = Z_95 / (1 + z2 / of) * math.sqrt(share * (1 - share) / of + z2 / (4 * of**2))
-    return Count(n=n, of=of, share_low=max(0.0, centre - half), share_high=min(1.0, centre + half))
+    from scipy.stats import binomtest  # seconds that most commands do not need
+
+    share = binomtest(n, of).proportion_ci(confidence_level=0.95, method="wilson")
+    return Count(n=n, of=of, share_low=max(0.0, float(share.low)), share_high=min(1.0, float(share.high)))

@@ -21,7 +21,8 @@ ROOMS = ("config", "learning", "perception", "robot", "sim_twin")
 EDGES = {
     "abstract.baselines", "abstract.bench", "abstract.learner", "abstract.protocol", "abstract.rules", "abstract.table",
     "agent", "assembly", "assess", "bench", "checkpoint", "cli", "consent", "demonstrations", "ended", "errors",
-    "evaluation", "evaluation_pool", "experiment", "explain", "figures", "fingerprint", "goals", "metrics",
+    "curves", "evaluation", "evaluation_pool", "experiment", "explain", "figure_style", "figures", "figures_compared",
+    "fingerprint", "goals", "metrics", "page", "page_style", "palette",
     "offline", "preceding", "progress", "provenance", "recorded", "recording", "replaying", "report",
     "report_files", "robot_hours", "rows", "run_folder", "run_search", "seeds", "session", "session_bench",
     "statistics", "stops", "stopwatch", "sweeping.cells", "sweeping.cli", "sweeping.executor", "sweeping.local",

@@ -16,7 +16,7 @@ from config.loader import load_learning, load_rig, load_sweep, resolve
 from config.sweep import Sweep
 from learning.errors import LearningError, RunFolderError
 from learning.report import Run, load_run
-from learning.report_files import write_report
+from learning.report_files import learners_of, write_report
 from learning.run_folder import RunFolder
 from learning.sweeping.cells import is_finished
 from learning.sweeping.executor import Executor
@@ -103,7 +103,7 @@ def _end(runner: SweepRunner, *, json: bool) -> None:
     """Merge what is whole, tell it, and leave with the exit code of what is not."""
     finished = [cell.name for cell in runner.cells if is_finished(cell, runner.folder)]
     if finished:
-        _merge([_named(load_run(RunFolder(runner.folder / name)), name) for name in finished], runner, json=json)
+        _merge([load_run(RunFolder(runner.folder / name)) for name in finished], runner, json=json)
     n_left = len(runner.cells) - len(finished)
     for name, why in runner.given_up.items():
         typer.echo(f"given up: {name}: {why}; what it said is in {runner.folder / 'logs' / name}.log", err=True)
@@ -114,13 +114,13 @@ def _end(runner: SweepRunner, *, json: bool) -> None:
         raise typer.Exit(EXIT_INTERRUPTED)
 
 
-def _named(run: Run, name: str) -> Run:
+def _named(run: Run) -> Run:
     """Return a run under its cell's name: what is merged does not tell where the sweep lies."""
-    return msgspec.structs.replace(run, folder=name)
+    return msgspec.structs.replace(run, folder=Path(run.folder).name)
 
 
 def _merge(runs: list[Run], runner: SweepRunner, *, json: bool) -> None:
-    report, paths = write_report(runs, runner.folder / "report")
+    report, paths = write_report([_named(run) for run in runs], runner.folder / "report", learners=learners_of(runs))
     if json:
         typer.echo(msgspec.json.encode(report).decode())
         return

@@ -62,7 +62,8 @@ def test_learn_leaves_a_whole_run_folder_and_prints_its_summary(run):
     path, done = run
     assert sorted(entry.name for entry in path.iterdir() if entry.is_file() and entry.name != "lock") == sorted(FILES)
     assert sorted(entry.name for entry in (path / "figures").iterdir()) == [
-        "curriculum.pdf", "curriculum.png", "figure2.pdf", "figure2.png", "summary.json",
+        "curriculum.pdf", "curriculum.png", "curriculum.svg", "figure2.pdf", "figure2.png", "figure2.svg",
+        "report.html", "summary.json",
     ]  # fmt: skip
     summary = json.loads(done.stdout)
     assert summary == json.loads((path / "summary.json").read_text())

@@ -2,8 +2,17 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.stats import mannwhitneyu
 
-from learning.statistics import Interval, interval_of, iqm, median_of, probability_of_improvement
+from learning.statistics import (
+    Interval,
+    Reached,
+    interval_of,
+    iqm,
+    median_of,
+    probability_of_improvement,
+    reached_by_half,
+)
 
 NUMBERS = st.lists(st.floats(-1e3, 1e3), min_size=3, max_size=25)
 
@@ -63,3 +72,29 @@ def test_what_one_wins_the_other_loses(a, b):
     ours = probability_of_improvement(a, b, rng=drawn(), n_draws=10)
     theirs = probability_of_improvement(b, a, rng=drawn(), n_draws=10)
     assert ours.value + theirs.value == pytest.approx(1.0)
+
+
+def test_the_share_of_pairs_is_mann_and_whitneys_and_the_interval_of_many_is_the_normal_one():
+    ours, theirs = [3.0, 1.0, 4.0, 1.0, 5.0], [2.0, 7.0, 1.0, 8.0]
+    told = probability_of_improvement(ours, theirs, rng=drawn())
+    assert told.value == pytest.approx(mannwhitneyu(ours, theirs).statistic / 20)
+    assert told.value == pytest.approx(7 / 20)  # six pairs won, two tied
+    values = np.linspace(-1.0, 1.0, 401)
+    mean = interval_of(values, rng=drawn(), figure=lambda v: v.mean(axis=-1))
+    half = 1.96 * values.std() / np.sqrt(401)
+    assert (mean.low, mean.high) == (pytest.approx(-half, rel=0.06), pytest.approx(half, rel=0.06))
+
+
+def test_a_run_that_never_came_there_counts_as_later_than_all():
+    assert reached_by_half([10, None, 30], rng=drawn()) == Reached(value=30.0, low=10.0, high=None)
+    assert reached_by_half([None, None, 30], rng=drawn()).value is None
+    all_alike = reached_by_half([20] * 20, rng=drawn())
+    assert all_alike == Reached(value=20.0, low=20.0, high=20.0)
+    most = reached_by_half([10 * i for i in range(1, 20)] + [None], rng=drawn())
+    assert most.value == 110.0
+    assert 50.0 <= most.low < most.value < most.high <= 160.0
+
+
+@pytest.mark.parametrize("values", [[], [5], [None, 3]])
+def test_half_of_two_runs_is_no_figure(values):
+    assert reached_by_half(values, rng=drawn()) is None
