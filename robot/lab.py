@@ -6,7 +6,7 @@ from config.limited import limited
 from config.resolved import Resolved
 from config.rig import Rig
 from robot.bus import Bus, Role
-from robot.bus.errors import BusError
+from robot.bus.errors import NoHubError
 from robot.bus.topics import ARM_STATE
 from robot.bus.twin_link import RemoteResetter, RemoteTruth
 from robot.errors import RobotConfigError
@@ -105,7 +105,7 @@ def join_robot_node(resolved: Resolved, *, is_driven: bool = False) -> RemoteSta
     bus = Bus(rig.bus, serial=rig.expected.serial, role=Role.TELEOP if is_driven else Role.LEARNING, keys=rig.keys)
     try:
         bus.open()
-    except BusError:
+    except NoHubError:
         if is_driven and rig.reset == "person":
             return None  # nothing else of the rig runs: who drives holds the arm himself
         raise

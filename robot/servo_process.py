@@ -330,6 +330,8 @@ class ServoServer:
                 self._cpu.unpin()
                 self._heed()
                 self._loop.engage()
+                if self._halt[0]:
+                    self._stop()
                 self._heed()
             case Seed():
                 return Seeded(state=self._seed())
@@ -338,9 +340,7 @@ class ServoServer:
             case BeginEpoch(epoch=epoch):
                 return Outputs(bits=self._loop.begin_epoch(epoch))
             case Stop():
-                self._is_in_command = False
-                if not self._plant.arm.stop():
-                    raise WireError(NOT_STOPPED)
+                self._stop()
             case Close():
                 self._is_over = True
             case StrideRequest():
@@ -350,8 +350,13 @@ class ServoServer:
     def _heed(self) -> None:
         """Take no arm that somebody said stop to. Raises SafetyError."""
         if self._halt[0]:
-            self._plant.arm.stop()
             raise SafetyError(STOPPED)
+
+    def _stop(self) -> None:
+        """Stop the arm and give up command. Raises WireError, which ends the process, where nobody confirms it."""
+        self._is_in_command = False
+        if not self._plant.arm.stop():
+            raise WireError(NOT_STOPPED)
 
     def _seed(self) -> ArmState:
         self._sequence, self._answered_ns = 0, None

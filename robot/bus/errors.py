@@ -2,11 +2,15 @@
 
 from robot.errors import RobotConfigError, WireError
 
-__all__ = ["BusConfigError", "BusError", "MalformedError", "SchemaError"]
+__all__ = ["BusConfigError", "BusError", "MalformedError", "NoHubError", "SchemaError"]
 
 
 class BusError(WireError):
     """The bus cannot be opened or does not answer."""
+
+
+class NoHubError(BusError):
+    """Nobody listens where the hub should: nothing else of the rig runs there."""
 
 
 class BusConfigError(RobotConfigError):

@@ -9,7 +9,7 @@ from typing import TypeVar
 import zenoh
 
 from robot.bus.endpoint import Endpoint, safe_endpoint
-from robot.bus.errors import BusConfigError, BusError
+from robot.bus.errors import BusConfigError, BusError, NoHubError
 from robot.bus.keys.guard import Guard
 
 __all__ = ["MAX_MESSAGE_BYTES", "on_link", "open_link"]
@@ -66,7 +66,7 @@ def open_link(endpoint: str, *, is_hub: bool, is_by_size: bool = False, guard: G
     try:
         return zenoh.open(config)
     except zenoh.ZError as error:
-        raise BusError(_why_no_hub(parts, error) if is_hub else _why_no_link(parts)) from error
+        raise (BusError(_why_no_hub(parts, error)) if is_hub else _no_link(parts)) from error
 
 
 def on_link(function: Callable[[T], None]) -> "zenoh.handlers.Callback[T]":
@@ -88,23 +88,24 @@ def _why_no_hub(endpoint: Endpoint, error: zenoh.ZError) -> str:
     )
 
 
-def _why_no_link(endpoint: Endpoint) -> str:
+def _no_link(endpoint: Endpoint) -> BusError:
     """Return why nobody let us in, as far as a bare connection can tell. Zenoh itself only says that time is over."""
     came = _knock(endpoint)
     if came == 0:
-        return (
+        return BusError(
             f"bus: expected the hub at {endpoint.text} to let us in; somebody listens there and did not, within "
             f"{CONNECT_MS / 1e3:g} s: another program, another version, a hub that hangs, or one that refuses us "
             "(these cannot be told apart from here); see what listens with `ss -ltnp`"
             + (", and `autotelic keys list` where the hub is" if endpoint.is_tls else "")
         )
     if came in (errno.ECONNREFUSED, errno.ENOENT):
-        return (
+        return NoHubError(
             f"bus: expected a hub at {endpoint.text}, nobody listens there: start the process that is the hub first "
             "(`autotelic up RIG` starts all of a rig's; `autotelic controller --bus ...` is one), or mend the "
             "endpoint in the rig's file"
         )
-    return f"bus: expected a hub at {endpoint.text}, it cannot be reached: {errno.errorcode.get(came, 'no answer')}"
+    told = errno.errorcode.get(came, "no answer")
+    return BusError(f"bus: expected a hub at {endpoint.text}, it cannot be reached: {told}")
 
 
 def _knock(endpoint: Endpoint) -> int:

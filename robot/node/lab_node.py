@@ -69,7 +69,10 @@ def open_robot_node(resolved: Resolved, *, pictures: Path = Path("resets")) -> G
             if is_fed(rig)
             else build_perception(resolved)
         )
-        tend: Callable[[], None] = lambda: node.tend()  # noqa: E731 - the node is made of what calls it
+
+        def tend() -> None:
+            node.tend()  # made below, of what calls this
+
         station = _station_of(resolved, bus, loop, perception, tend=tend, pictures=pictures)
 
         def drive(is_driven: bool) -> None:

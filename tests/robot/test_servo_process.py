@@ -213,6 +213,27 @@ def test_a_stop_that_nobody_confirms_is_said_and_ends_the_process(served, is_con
         assert served.ended_by == "death"
 
 
+@pytest.mark.parametrize(("is_confirmed", "kind", "is_end"), [(True, "SafetyError", False), (False, "WireError", True)])
+def test_a_stop_that_is_said_as_command_was_just_taken_gives_it_up_again(served, is_confirmed, kind, is_end):
+    def engage():
+        served.halt[0] = 1
+
+    def stop():
+        stops.append(is_confirmed)
+        return is_confirmed
+
+    stops = []
+    assert isinstance(served.ask(Stop()), Done)
+    served.plant.arm.engage, served.plant.arm.stop = engage, stop
+    told = served.ask(Engage())
+    assert (told.kind, told.is_end) == (kind, is_end)
+    assert stops == [is_confirmed]
+    if is_confirmed:
+        assert isinstance(served.ask(Close()), Done)
+    served.thread.join(WAIT_S)
+    assert served.ended_by == ("end" if is_confirmed else "death")
+
+
 def test_a_latch_whose_stop_nobody_confirms_ends_the_process(served):
     served.plant.arm.stop = lambda: False
     served.plant.arm.mode = ArmMode.PROTECTIVE_STOP

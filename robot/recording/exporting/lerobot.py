@@ -64,16 +64,18 @@ def _write_data(
     """Write the frames, and return a row an episode and all columns whole, for what is told of them."""
     rows: list[dict[str, object]] = []
     whole: dict[str, list[Column]] = {name: [] for name in _features(names)}
+    first = 0
     for n_file, group in enumerate(_files(episodes)):
         at = {"chunk_index": n_file // MOST_FILES, "file_index": n_file % MOST_FILES}
         tables = []
         for episode in group:
-            index, first = len(rows), int(rows[-1]["dataset_to_index"]) if rows else 0  # type: ignore[call-overload]
+            index = len(rows)
             columns = _columns(episode, numbers, names, index=index, first=first)
             for name, values in columns.items():
                 whole[name].append(values)
             tables.append(_frame_table(columns))
             rows.append(_episode_row(episode, columns, at, index=index, first=first))
+            first += len(episode)
         _write_table(folder / DATA.format(**at), pa.concat_tables(tables))
     return rows, {name: np.concatenate(parts) for name, parts in whole.items()}
 

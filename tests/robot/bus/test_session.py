@@ -27,6 +27,7 @@ from robot.bus import (
     Topic,
     link,
 )
+from robot.bus.errors import NoHubError
 from robot.bus.outlet import Outlet
 from robot.bus.topic import key_of
 from robot.bus.watch import ping_all
@@ -204,7 +205,7 @@ def test_rubbish_and_other_versions_on_a_topic_are_counted_and_end_nothing(hub, 
 
 def test_where_nobody_listens_that_is_said(endpoint, monkeypatch):
     monkeypatch.setattr(link, "CONNECT_MS", 300)
-    with pytest.raises(BusError, match="nobody listens there: start the process that is the hub") as absent:
+    with pytest.raises(NoHubError, match="nobody listens there: start the process that is the hub") as absent:
         join(endpoint).open()
     assert "\n" not in str(absent.value)
 
@@ -212,8 +213,9 @@ def test_where_nobody_listens_that_is_said(endpoint, monkeypatch):
 def test_where_somebody_listens_who_does_not_let_us_in_that_is_said(monkeypatch):
     monkeypatch.setattr(link, "CONNECT_MS", 300)
     said = r"somebody listens there and did not, within 0\.3 s"
-    with socket.create_server((HOST, 0)) as other, pytest.raises(BusError, match=said):
+    with socket.create_server((HOST, 0)) as other, pytest.raises(BusError, match=said) as refused:
         join(f"tcp/{HOST}:{other.getsockname()[1]}").open()
+    assert not isinstance(refused.value, NoHubError), "who drives must not take it for an empty cell"
 
 
 def test_an_endpoint_that_is_taken_is_said_to_be(hub, endpoint):
