@@ -202,10 +202,12 @@ class RemoteStation:
         caller = StopCaller(self._bus, by=by)
         took_s = caller.stop(within_s=STOP_S)
         caller.close()
-        if took_s is None:
+        if took_s is None or caller.report is None:
             raise SafetyError(
                 f"stop: expected a robot node to confirm it within {STOP_S:g} s, none did: look at the arm"
             )
+        with self._came:
+            self._known.take(caller.report)  # this station's own subscription may hear it later
 
     def challenge(self) -> str | None:
         """Refuse: no bus carries answers. Raises SafetyError."""

@@ -27,8 +27,13 @@ class StopCaller:
         self._by = by
         self._publisher = bus.publisher(STOP)
         self._heard = Condition()
-        self._confirmed: set[int] = set()
+        self._report: StationReport | None = None
         self._subscriber = bus.subscriber(REPORT, self._take)
+
+    @property
+    def report(self) -> StationReport | None:
+        """What a robot node told last of its station, where it told anything: after a confirmed stop that it stands."""
+        return self._report
 
     def stop(
         self, *, within_s: float, is_final: bool = False, goes_on: Callable[[], bool] = lambda: True
@@ -49,7 +54,7 @@ class StopCaller:
         while monotonic() - begun_s < within_s and goes_on():
             self._publisher.put(asked)
             with self._heard:
-                if self._heard.wait_for(lambda: number in self._confirmed, AGAIN_S):
+                if self._heard.wait_for(lambda: self._is_confirmed(number), AGAIN_S):
                     return monotonic() - begun_s
         return None
 
@@ -59,5 +64,8 @@ class StopCaller:
 
     def _take(self, received: Received[StationReport]) -> None:
         with self._heard:
-            self._confirmed = set(received.message.stops)
+            self._report = received.message
             self._heard.notify_all()
+
+    def _is_confirmed(self, number: int) -> bool:
+        return self._report is not None and number in self._report.stops

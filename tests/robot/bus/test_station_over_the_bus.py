@@ -169,8 +169,15 @@ def test_anybody_may_stop_it_and_it_stays_stopped_until_somebody_arms_it(engaged
     assert not engaged.step(GO).is_void
 
 
+def test_whoever_stopped_it_knows_at_once_that_it_stands(engaged):
+    engaged.stop(by="the learner")
+    assert engaged.state.mode is StationMode.LATCHED
+    assert engaged.state.reason == "stopped by the learner"
+
+
 def test_after_a_final_stop_nothing_is_armed_by_this_robot_node(engaged, viewer):
-    StopCaller(viewer, by="the supervisor").stop(within_s=5.0, is_final=True)
+    assert StopCaller(viewer, by="the supervisor").stop(within_s=5.0, is_final=True) is not None
+    until(lambda: engaged.state.mode is StationMode.LATCHED)
     with pytest.raises(SafetyError, match="is ending it"):
         SimulatedOperator().rearm(engaged, seed=1, epoch=1)
 
