@@ -54,7 +54,7 @@ STALE_NS = 40_000_000
 that looks, the one in which the controller last sent, and what a busy machine adds to either."""
 PAUSE_NS, HAND_NS = 50_000_000, 40_000_000
 """After such a pause what the hand said last is of before; and so long its next word is waited for."""
-STOP_RAD_S2, REST_S, STILL_RAD_S = 10.0, 1.0, 0.01
+REST_S, STILL_RAD_S = 1.0, 0.01
 START_S = 2.0
 
 
@@ -173,6 +173,7 @@ class RtdeArm:
         self._note_freshness(receive)
         grip = self._grip_where_powered()
         self._runtime, self._speed_fraction = int(receive.getRuntimeState()), receive.getTargetSpeedFraction()
+        self._command.note(self._runtime)
         modes = receive.getRobotMode(), receive.getSafetyStatusBits()
         if modes != self._modes:
             self._modes, self._mode = modes, mode_of(*modes)
@@ -240,11 +241,9 @@ class RtdeArm:
             Whether rest was seen, and that the program has ended. Where not, this process must end.
         """
         self.abandon()
-        if self.links.is_lost_now:
+        if self.links.is_lost_now or self._command.is_replaced():
             return False
-        if self._command.control is not None:
-            with suppress(RuntimeError):
-                self._command.control.servoStop(STOP_RAD_S2)  # taken or not: rest is looked at, and the program ended
+        self._command.brake()
         is_resting = self._wait_rest()
         if self.links.is_lost_now:
             return False

@@ -25,6 +25,7 @@ from robot.hal.rtde_outputs import N_OUTPUTS, DigitalOutputs
 from robot.hal.rtde_probe import probe_upload
 from robot.hal.rtde_set_up import arm_watchdog, carries, end_program, prove_watchdog, set_tool
 from robot.hal.ur_calls import bounded
+from robot.hal.ur_state import Runtime
 from robot.messages import Vec6
 
 __all__ = ["ALL_BITS", "RATE_HZ", "TAKE_S", "Readers", "RtdeCommand"]
@@ -38,6 +39,9 @@ ALL_BITS = (1 << N_OUTPUTS) - 1
 
 PRIMARY_TICKS = 5
 """Of 2 ms, between two looks at who has started something on the controller."""
+STOP_RAD_S2, STOP_S = 10.0, 2.0
+"""How an arm that is told to stop brakes, and how long the client may take over it: where another program came up
+meanwhile it would wait 300 s for that one's answer."""
 
 Readers: TypeAlias = tuple[RTDEReceiveInterface, DashboardClient]
 
@@ -66,6 +70,8 @@ class RtdeCommand:
         self.outputs: DigitalOutputs | None = None
         self._primary = PrimaryWatch(address, tool=(*tool.tcp_m, 0.0, 0.0, 0.0))
         self._obedience, self._n_looks = Obedience(), 0
+        self._has_ended = False
+        """Our program was seen to have ended: whatever runs after that is somebody else's."""
 
     def take(self, clock: Clock) -> None:
         """Upload the program, have its watchdog proven, upload it anew, set payload and tool, arm the watchdog last.
@@ -91,6 +97,28 @@ class RtdeCommand:
         self.control = self._connected()
         self._set_up(self.control, receive, clock)
         self._links.require()
+        self._has_ended = False
+
+    def note(self, runtime: int) -> None:
+        """Take note of a runtime state that was read."""
+        self._has_ended |= runtime in (Runtime.STOPPING, Runtime.STOPPED)
+
+    def is_replaced(self) -> bool:
+        """Look whether somebody else's program runs where ours did: it is not ours to end, and answers us nothing."""
+        if self.control is None:
+            return False
+        changed, runtime = self._primary.look(), Runtime.STOPPED
+        with suppress(RuntimeError):  # the client throws it where it has no state
+            runtime = int(self._readers()[0].getRuntimeState())
+        is_foreign = changed is not None and changed[0]
+        self._links.is_lost |= is_foreign or (self._has_ended and runtime == Runtime.PLAYING)
+        return self._links.is_lost
+
+    def brake(self) -> None:
+        """Have our program bring the joints to rest, where it has not ended. Taken or not: rest is to be looked at."""
+        if self.control is not None and not self._has_ended:
+            with suppress(RuntimeError), self._in_time(STOP_S):
+                self.control.servoStop(STOP_RAD_S2)
 
     def require_ours(self, sent_rad: Vec6) -> None:
         """Look at one part of what may change on a controller while our program seems to run; called every tick.
@@ -168,14 +196,14 @@ class RtdeCommand:
             Whether the program has ended, and no coil of a drive is left with current.
         """
         is_ended = True
-        changed = self._primary.look() if self.control is not None else None
+        is_replaced = self.is_replaced()
         self._primary.close()
-        if changed is not None and changed[0]:
-            self._links.is_lost = True  # what runs there now is not ours to end
+        if is_replaced:
             return False
         if self.control is not None:
             receive, dashboard = self._readers()
-            is_ended = end_program(self.control, receive, dashboard, clock)
+            with self._in_time(STOP_S):
+                is_ended = end_program(self.control, receive, dashboard, clock)
         outputs, self.outputs = self.outputs, None
         if outputs is not None:
             is_rested = False
@@ -218,8 +246,9 @@ class RtdeCommand:
         self._links.look()
         return control
 
-    def _in_time(self) -> AbstractContextManager[None]:
-        return bounded(TAKE_S if self._links.when_lost is not None else None)
+    def _in_time(self, limit_s: float = TAKE_S) -> AbstractContextManager[None]:
+        """Bound what may hang by this process's end, where it may end."""
+        return bounded(limit_s if self._links.when_lost is not None else None)
 
     def _set_up(self, control: RTDEControlInterface, receive: RTDEReceiveInterface, clock: Clock) -> None:
         """Set payload and tool centre point, open the outputs, listen to what changes, arm the watchdog last."""

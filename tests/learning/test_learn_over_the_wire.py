@@ -6,15 +6,12 @@ import re
 import signal
 import subprocess
 import time
-from contextlib import contextmanager
-from threading import Event, Thread
+from threading import Event
 
-import numpy as np
 import pytest
 
-from config.loader import load_arm
 from learning.run_folder import RunFolder
-from robot.bus import RESET, Bus, ResetRequest, Role
+from tests.support.person_at_arm import attended
 from tests.support.small_lab import SERIAL, autotelic, children_of, controller_of, make_lab, start
 
 pytestmark = pytest.mark.realtime
@@ -188,73 +185,10 @@ def test_workers_are_refused_where_there_is_one_arm(lab):
     assert "--workers" in said
 
 
-class AtTheArm:
-    """Sits at the robot node's terminal: presses Enter, types codes, and lays the table out when told what is off."""
-
-    def __init__(self, folder, controller, bus):
-        self.folder, self.controller, self.bus = folder, controller, bus
-        self.said, self.parked_rad = [], []
-        self.home = np.array(load_arm("ur5e").home_rad)
-        self.asked = None
-
-    def answer(self, line):
-        """Return what is typed at a line, None at one that asks nothing."""
-        self.said.append(line)
-        code = re.search(r"the code is (\d+)", line)
-        if code:
-            return code[1]
-        if "Enter" not in line:
-            return None
-        asked = re.search(r"epoch (\d+), seed (\d+), as in (\S+);", line)
-        if asked:
-            truth = self.controller.fault("truth")
-            assert truth["runtime"] == "STOPPED", "a person reaches in: nobody may be in command"
-            self.parked_rad.append(np.abs(np.array(truth["q_rad"]) - self.home).max())
-            assert (self.folder / asked[3]).read_bytes()[:4] == b"\x89PNG"
-            self.asked = asked
-        elif "put right" in line:
-            self.bus.asker(RESET).ask(ResetRequest(seed=int(self.asked[2]), epoch=int(self.asked[1]), digital_out=0))
-        return ""
-
-    def attend(self, process):
-        """Answer whatever a process asks, until it ends."""
-        for line in process.stderr:
-            typed = self.answer(line)
-            if typed is not None:
-                process.stdin.write(f"{typed}\n")
-                process.stdin.flush()
-
-
-@contextmanager
-def attended(lab):
-    """Run perception node and robot node, with a person at the latter's terminal."""
-    folder, controller, host = lab
-    bus = Bus(f"tcp/{host}:7447", serial=SERIAL, role=Role.LEARNING, source="hand")
-    bus.open()
-    node = ("--rig", "rig.yaml", "--scenario", "small.yaml")
-    person = AtTheArm(folder, controller, bus)
-    with (
-        start(folder, "node", "perception", *node, stdin=subprocess.DEVNULL) as perception,
-        start(folder, "node", "robot", *node, stdin=subprocess.PIPE) as robot,
-    ):
-        attends = Thread(target=person.attend, args=(robot,))
-        attends.start()
-        try:
-            until(lambda: any("waits for a source" in line for line in person.said))
-            yield person, robot
-        finally:
-            for process in (robot, perception):
-                process.send_signal(signal.SIGINT)
-            for process in (robot, perception):
-                process.wait(timeout=20)
-            attends.join()
-            bus.close()
-
-
 @pytest.mark.slow
 def test_a_person_at_the_robot_nodes_terminal_arms_and_lays_the_table_out_while_the_arm_is_parked(lab_by_person):
     folder, controller, _ = lab_by_person
-    with attended(lab_by_person) as (person, _):
+    with attended(*lab_by_person) as (person, _):
         code, _, said = autotelic(folder, *learn("run", "--epochs", "1"), timeout_s=240, said="\n")
     text = "".join(person.said)
     assert code == 0, said + text
@@ -272,7 +206,7 @@ def test_a_person_at_the_robot_nodes_terminal_arms_and_lays_the_table_out_while_
 @pytest.mark.slow
 def test_who_has_died_is_waited_for_no_longer_and_the_next_one_is_asked_for_anew(lab_by_person):
     folder, controller, _ = lab_by_person
-    with attended(lab_by_person) as (person, _):
+    with attended(*lab_by_person) as (person, _):
         answer, is_there = person.answer, Event()
         is_there.set()
 

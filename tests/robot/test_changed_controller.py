@@ -1,12 +1,15 @@
 """What somebody else changes on a controller while its arm is ours: told by name, and nothing more is sent."""
 
 import socket
+import time
+from time import monotonic
 
 import pytest
 
 from config.loader import load_arm
 from robot.errors import ArmRefusedError, StaleStateError
 from robot.hal.obedience import N_SAMPLES, TOLERANCE_RAD, Obedience
+from robot.hal.ur_state import Runtime
 from robot.messages import ArmCommand, GripCommand
 from sim_twin.controller.process import ControllerProcess
 from sim_twin.controller.server import Setup
@@ -51,6 +54,13 @@ def send(controller, script):
         link.recv(64)
 
 
+def until(is_true, timeout_s=10.0):
+    end_s = monotonic() + timeout_s
+    while not is_true():
+        assert monotonic() < end_s
+        time.sleep(0.005)
+
+
 def drive(arm, n_ticks, *, by_rad=0.0):
     """Write for some ticks, joint 0 moving on at a steady pace."""
     q_rad, grip = arm.read().q_rad, GripCommand(opening_m=0.04, force_n=20.0, speed_m_s=0.02)
@@ -82,11 +92,30 @@ def runtime(controller):
 
 @pytest.mark.parametrize("n", [0, *(pytest.param(n, marks=pytest.mark.slow) for n in range(1, 5))])
 def test_a_program_that_replaces_ours_is_told_within_the_second_and_goes_on(controller, arm, n):
+    begun_s = monotonic()
     send(controller, OTHER)
     said = told(arm)
     # The state in between is seen now and then; what started is always told.
     assert "somebody started the program 'other'" in said or "has ended" in said
     assert not arm.stop(), "the process that held the arm must end"
+    assert monotonic() - begun_s < 5.0, "the client waits 300 s for what another program never answers"
+    assert "PLAYING" in runtime(controller)
+    send(controller, "def nothing():\n stopj(2.0)\nend\n")
+
+
+def test_what_runs_after_our_program_was_seen_to_have_ended_is_neither_asked_nor_ended(controller, arm):
+    """Also where the start was not heard: nothing is known then but that a program runs again."""
+    with socket.create_connection((controller.host, 29999), timeout=5.0) as link:
+        link.recv(128)
+        link.sendall(b"stop\n")
+        link.recv(128)
+    assert "has ended" in told(arm)
+    arm._command._primary.close()
+    send(controller, OTHER)
+    until(lambda: "PLAYING" in runtime(controller) and arm.status().runtime == Runtime.PLAYING)
+    begun_s = monotonic()
+    assert not arm.stop()
+    assert monotonic() - begun_s < 5.0
     assert "PLAYING" in runtime(controller)
     send(controller, "def nothing():\n stopj(2.0)\nend\n")
 

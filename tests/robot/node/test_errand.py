@@ -12,7 +12,7 @@ from robot.bus import Bus, Role
 from robot.errors import RobotError, SafetyError
 from robot.messages import StationMode
 from robot.node import NodeAsker, RemoteStation, StopCaller
-from robot.operated import AskingOperator
+from robot.operated import AskingOperator, OperatedStation
 from robot.person import TerminalPerson
 from robot.safety import Answer
 from tests.support.robot_node import SERIAL, Node
@@ -190,3 +190,42 @@ def test_waiting_for_a_person_ends_where_what_he_is_asked_for_is_void(monkeypatc
         monkeypatch.setattr("sys.stdin", keyboard)
         with pytest.raises(SafetyError, match="it is void"):
             TerminalPerson(void).await_key("again")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("away_s", [0.5, 4.0])
+def test_a_hub_that_is_away_while_a_person_is_asked_ends_no_run(away_s):
+    """Shorter than a lease lives, or longer: the question goes on, or is void and asked once more."""
+    with socket.create_server((HOST, 0)) as free:
+        endpoint = f"tcp/{HOST}:{free.getsockname()[1]}"
+
+    def hub():
+        opened = Bus(endpoint, serial=SERIAL, role=Role.VIEWER, source="hub", is_hub=True)
+        opened.open()
+        return opened
+
+    first, person = hub(), AtTheArm()
+    node = Node(endpoint, is_hub=False, person=person)
+    person.tend = node.node.tend
+    bus = Bus(endpoint, serial=SERIAL, role=Role.LEARNING, source="learning")
+    bus.open()
+    station = RemoteStation(bus, asker=NodeAsker(bus, wait_s=20.0))
+    came = []
+
+    def run():
+        with OperatedStation(station, AskingOperator()) as operated:
+            came.append(operated.reset(seed=1, epoch=0))
+
+    thread = threading.Thread(target=run)
+    thread.start()
+    until(lambda: person.asked)
+    first.close()
+    time.sleep(away_s)
+    second = hub()
+    time.sleep(2.0)
+    assert node.local.state.mode is not StationMode.ENGAGED
+    person.agrees.set()
+    thread.join()
+    node.close()
+    second.close()
+    assert len(came) == 1
