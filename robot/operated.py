@@ -88,7 +88,8 @@ class OperatedStation:
     def connect(self) -> None:
         """Arm the station, if there is an operator and it is not armed yet.
 
-        An arm that stops meanwhile has latched: the first reset arms it again, as after any other stop.
+        An arm that stops meanwhile has latched: the first reset arms it again, as after any other stop. So it does where
+        the lease ended while a person at the arm was waited for.
 
         Raises:
             RobotError: the operator refuses, the arm cannot be reached, or a file is wrong.
@@ -99,8 +100,8 @@ class OperatedStation:
             self._operator.arm_once(self._station)
         except RobotConfigError:
             raise
-        except RobotError:
-            if self._station.state.mode is not StationMode.LATCHED:
+        except RobotError as error:
+            if not isinstance(error, NotEngagedError) and self._station.state.mode is not StationMode.LATCHED:
                 raise
 
     @property
