@@ -11,8 +11,9 @@ from config.scenario import Scenario
 from config.values import Point
 from config.yaml_text import join
 
-__all__ = ["check_limits", "check_limits_fit", "check_profile_named"]
+__all__ = ["check_limits", "check_limits_fit", "check_parked", "check_profile_named"]
 
+Joints = tuple[float, float, float, float, float, float]
 ROUNDING_M = 1e-9
 PUSH_N_S_M = 1000.0
 """What presses on a tool that slides into what stands on the table, for each m/s at which it met that: on the twin 580
@@ -55,6 +56,32 @@ def check_limits_fit(limits: LimitsFile, arm: ArmConfig, scenario: Scenario, fil
         _check_stopping(profile, arm, where, checker)
         _check_contacts(profile, arm, where, checker)
         _check_guarded(profile, arm, where, checker)
+
+
+def check_parked(profile: Profile, arm: ArmConfig, parked_rad: Joints, file: str) -> None:
+    """Check that where the arm waits for a person is inside of every range, fence and cone, and of its workspace.
+
+    Args:
+        profile: the limits that are held.
+        arm: the arm, its workspace cut to the scenario's.
+        parked_rad: its joints there.
+        file: what errors call the rig's file.
+    """
+    checker, at = Checker(file), "parked_rad"
+    for i, (joint, angle_rad) in enumerate(zip(profile.joints, parked_rad, strict=True)):
+        low, high = (end + sign * joint.soft_margin_rad for end, sign in zip(joint.range_rad, (1, -1), strict=True))
+        checker.need(low <= angle_rad <= high, f"{at}[{i}]", f"an angle from {low:g} to {high:g}", f"{angle_rad:g}")
+    points, space = part_points(arm, parked_rad), profile.workspace
+    low_m, high_m = arm.motion.workspace_m
+    x, y, z = tcp = points[ArmPart.TCP]
+    is_in = all(a <= v <= b for a, v, b in zip(low_m, tcp, high_m, strict=True))
+    checker.need(is_in, at, f"a tool from {low_m} to {high_m} m", f"one at ({x:.3f}, {y:.3f}, {z:.3f}) m")
+    for thing in (*space.boxes, *space.planes, *space.keep_outs):
+        for part in thing.parts:
+            expected = f"{thing.name} to leave the {part} on the allowed side"
+            checker.need(gap_m(thing, points[part]) > 0.0, at, expected, "it beyond")
+    tilt = tilt_rad(arm, parked_rad)
+    checker.need(tilt < space.tool_cone_rad, at, f"a tool tilted by less than {space.tool_cone_rad:g}", f"{tilt:g}")
 
 
 def _check_home(profile: Profile, arm: ArmConfig, where: str, checker: Checker) -> None:

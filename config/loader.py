@@ -12,7 +12,7 @@ from config.checks import check_arm, check_cell, check_learning, check_rig, chec
 from config.decode import decode
 from config.errors import ConfigError
 from config.learning import LearningConfig
-from config.limit_checks import check_limits, check_limits_fit, check_profile_named
+from config.limit_checks import check_limits, check_limits_fit, check_parked, check_profile_named
 from config.limited import limited
 from config.limits import LimitsFile
 from config.placing import check_fit, check_placing
@@ -345,6 +345,8 @@ def _check_together(resolved: Resolved, files: _Files) -> None:
         )
     check_profile_named(resolved.limits, rig.profile, files.rig)
     check_limits_fit(resolved.limits, arm, resolved.scenario, files.limits)
+    if rig.parked_rad is not None:
+        check_parked(resolved.profile, arm, rig.parked_rad, files.rig)
     check_fit(resolved.scenario, limited(arm, resolved.profile), files.scenario)
     if resolved.cell is not None:
         check_cell_fits(resolved.scenario, resolved.cell, files.cell)

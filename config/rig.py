@@ -4,7 +4,7 @@ from typing import Annotated
 
 from msgspec import Meta
 
-from config.values import Name, Section
+from config.values import Angle, Name, Section
 
 __all__ = ["DEFAULT_LIMITS", "NodeStart", "PlantExpected", "Rig", "RigCamera"]
 
@@ -80,6 +80,8 @@ class Rig(Section, frozen=True, kw_only=True):
     """A shipped cell's name or a path: where the control box has the table's signals. Straight through where absent."""
     reset: Annotated[str, Meta(pattern=r"^(twin|person)\Z")] = "twin"
     """Who lays the table out: the twin's process, or a person whom the arm waits for."""
+    parked_rad: tuple[Angle, Angle, Angle, Angle, Angle, Angle] | None = None
+    """Where the arm waits while a person lays the table out, out of the camera's sight; its home where None."""
     address: Annotated[str, Meta(pattern=r"^[A-Za-z0-9._:-]{1,253}\Z")] | None = None
     """Host or IP address of the arm's controller, where it has one."""
     bus: Annotated[str, Meta(pattern=r"^(tcp|tls|unixsock-stream)/[A-Za-z0-9._:/-]{1,200}\Z")] | None = None

@@ -88,7 +88,7 @@ class OperatedStation:
     def connect(self) -> None:
         """Arm the station, if there is an operator and it is not armed yet.
 
-        An arm that stops meanwhile has latched: the first reset arms it again, as after any other stop. So it does where
+        An arm that stops meanwhile has latched: the first reset arms it again, as after any other stop, and as where
         the lease ended while a person at the arm was waited for.
 
         Raises:

@@ -13,7 +13,7 @@ from robot.layout import Layout, draw_layout
 from robot.messages import SceneState
 from robot.person import Person
 
-__all__ = ["PersonLook", "PersonResetter", "misplaced"]
+__all__ = ["PersonLook", "PersonResetter", "misplaced", "unseen_under_lids"]
 
 TOLERANCE_M = 0.01
 HIGH_M = 0.02
@@ -77,9 +77,14 @@ class PersonResetter:
         while not is_laid_out:
             self._person.await_key(request)
             request = "put right what is not in place"
-            if self._is_in_place(layout):
-                self._person.await_key("everything is in place; take your hands off the table, the arm moves next")
-                is_laid_out = self._is_in_place(layout)
+            unseen = self._unseen_where_in_place(layout)
+            if unseen is not None:
+                on_word = "".join(f"; {name} is taken on your word to be in {box}" for name, box in unseen.items())
+                self._person.await_key(
+                    f"everything that can be seen is in place{on_word}; take your hands off the table, the arm moves "
+                    "next"
+                )
+                is_laid_out = self._unseen_where_in_place(layout) is not None
 
     def _how_it_is(self) -> str:
         """Return in words whether the arm was seen to be let go of."""
@@ -88,19 +93,16 @@ class PersonResetter:
             return "the arm is disarmed"
         return f"NOT CONFIRMED that nothing runs on the arm ({why}): look at its pendant that no program does"
 
-    def _is_in_place(self, layout: Layout) -> bool:
-        """Look, and say what is not."""
-        off = self._off(layout)
+    def _unseen_where_in_place(self, layout: Layout) -> dict[str, str] | None:
+        """Look, and say what is not in place: then None, else what nobody sees under lids, and in which box."""
+        try:
+            scene = self._scene.read()
+            off = misplaced(layout, scene, self._scenario)
+        except WireError as error:  # a table that nobody sees is none
+            scene, off = None, [f"nothing is perceived: {error}"]
         for line in off:
             self._person.tell(f"not in place: {line}")
-        return not off
-
-    def _off(self, layout: Layout) -> list[str]:
-        """Return in words what is not in place; a table that nobody sees is none."""
-        try:
-            return misplaced(layout, self._scene.read(), self._scenario)
-        except WireError as error:
-            return [f"nothing is perceived: {error}"]
+        return unseen_under_lids(scene, self._scenario) if scene is not None and not off else None
 
 
 class PersonLook:
@@ -122,14 +124,26 @@ class PersonLook:
         self._person.await_key("the arm is disarmed: see to what is wrong at the table, take your hands off it")
 
 
+def unseen_under_lids(scene: SceneState, scenario: Scenario) -> dict[str, str]:
+    """Return what belongs in a box with a lid and is not perceived, by the box's name: nobody can look inside."""
+    lidded = {box.name for box in scenario.boxes if box.lid is not None}
+    seen = {thing.name for thing in scene.objects}
+    return {c.name: c.inside for c in scenario.cylinders if c.inside in lidded and c.name not in seen}
+
+
 def misplaced(layout: Layout, scene: SceneState, scenario: Scenario) -> list[str]:
-    """Return in words what is more than 10 mm from where it was drawn, lies, is held up, or is not perceived."""
+    """Return in words what is more than 10 mm from where it was drawn, lies, is held up, or is not perceived.
+
+    What is not perceived because a lid hides it is not among these.
+    """
     places = {thing.name: thing.position_m for thing in scene.objects}
+    hidden = unseen_under_lids(scene, scenario)
     wanted = layout.fixtures_m | {name: standing.position_m for name, standing in layout.cylinders.items()}
     off = []
     for name, (x, y) in wanted.items():
         if name not in places:
-            off.append(f"{name}: not perceived")
+            if name not in hidden:
+                off.append(f"{name}: not perceived: is something between it and the camera?")
             continue
         away_m = math.dist((x, y), places[name][:2])
         if not away_m <= TOLERANCE_M:

@@ -11,7 +11,7 @@ from robot.person_reset import PersonResetter
 __all__ = ["PersonResetStation"]
 
 PARK_RAD_S = 0.3
-"""No joint is asked to go faster on the way home."""
+"""No joint is asked to go faster on the way to where the arm waits."""
 NEAR_M, NEAR_RAD = 0.003, 0.01
 MOST_S = 60.0
 
@@ -23,10 +23,10 @@ class PersonResetStation(LocalStation):
     """
 
     def prepare(
-        self, resetter: PersonResetter, home_rad: Vec6, *, meanwhile: Callable[[], object] = lambda: None
+        self, resetter: PersonResetter, parked_rad: Vec6, *, meanwhile: Callable[[], object] = lambda: None
     ) -> None:
         """Store who resets, where the arm waits meanwhile, and what is called before each step of its way."""
-        self._by_person, self._home_rad, self._meanwhile = resetter, home_rad, meanwhile
+        self._by_person, self._parked_rad, self._meanwhile = resetter, parked_rad, meanwhile
 
     def reset(self, *, seed: int, epoch: int) -> Percept:
         """Park, let a person lay the table out, and go to the epoch's start.
@@ -41,15 +41,15 @@ class PersonResetStation(LocalStation):
         return self._go_to(self._by_person.layout_of(seed=seed, epoch=epoch).start_m, percept)
 
     def _park(self) -> None:
-        """Rise, then go to the home joints."""
+        """Rise, then go to where the arm waits."""
         top_m = self.spec.heights_m[1]
         state = self._rise(top_m)
         step_rad = PARK_RAD_S * self.spec.step_s
-        farthest = max(abs(b - a) for a, b in zip(state, self._home_rad, strict=True))
+        farthest = max(abs(b - a) for a, b in zip(state, self._parked_rad, strict=True))
         n_steps = max(1, math.ceil(farthest / step_rad))
         for k in range(1, n_steps + 1):
-            self._carry_out(JointTarget(q_rad=_between(state, self._home_rad, k / n_steps)))
-        self._wait_for(self._home_rad)
+            self._carry_out(JointTarget(q_rad=_between(state, self._parked_rad, k / n_steps)))
+        self._wait_for(self._parked_rad)
 
     def _rise(self, height_m: float) -> Vec6:
         """Go straight up and return the joints there."""
@@ -65,7 +65,7 @@ class PersonResetStation(LocalStation):
             self._carry_out(JointTarget(q_rad=q_rad))
             if max(abs(b - a) for a, b in zip(self._measured.q_rad, q_rad, strict=True)) < NEAR_RAD:
                 return
-        raise SafetyError("parking: expected the arm at home within a minute, it is not: is something in its way?")
+        raise SafetyError("parking: expected the arm parked within a minute, it is not: is something in its way?")
 
     def _go_to(self, place_m: Vec3, percept: Percept) -> Percept:
         """Go to a place in straight steps of half the most that a step may have."""
@@ -84,7 +84,7 @@ class PersonResetStation(LocalStation):
         result = self.step(intent)
         if result.verdicts:
             verdict = result.verdicts[0]
-            raise SafetyError(f"on the way between home and table: {verdict.reason}: {verdict.detail}")
+            raise SafetyError(f"on the way between parking and table: {verdict.reason}: {verdict.detail}")
         return result
 
     @property

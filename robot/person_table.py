@@ -4,6 +4,7 @@ from collections.abc import Callable
 from time import monotonic_ns
 from typing import Protocol
 
+from robot.errors import StaleStateError
 from robot.hal.protocols import SceneTruth
 from robot.messages import ArmState, ObjectPose, Percept, SceneState
 from robot.station_doors import Perceives, Sighted
@@ -49,15 +50,25 @@ class PerceivedTable:
         if isinstance(self._perception, Sighted):
             self._perception.forget()
         end_ns = self._now_ns() + LOOK_NS
-        percept = self._look()
+        percept = self._look_once_more(end_ns)
         while not all(thing.is_valid for thing in percept.objects) and self._now_ns() < end_ns:
             self._meanwhile()
-            percept = self._look()
+            percept = self._look_once_more(end_ns)
         seen = [thing for thing in percept.objects if thing.is_valid]
         return SceneState(
             stamp_ns=percept.stamp_ns,
             objects=tuple([ObjectPose(name=t.name, position_m=t.position_m, quat=t.quat) for t in seen]),
         )
+
+    def _look_once_more(self, end_ns: int) -> Percept:
+        """Look until there is a percept that is not too old: one that is late now and then is no blind camera."""
+        while True:
+            try:
+                return self._look()
+            except StaleStateError:
+                if self._now_ns() >= end_ns:
+                    raise
+            self._meanwhile()
 
     def _look(self) -> Percept:
         truth = self._truth

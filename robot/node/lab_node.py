@@ -122,7 +122,7 @@ def _station_of(
         scenario=resolved.scenario, loop=loop, scene=table, person=TerminalPerson(tend), pictures=pictures
     )
     station = _station(PersonResetStation, resolved, loop, perception, truth, by_person)
-    station.prepare(by_person, resolved.arm.home_rad, meanwhile=tend)
+    station.prepare(by_person, rig.parked_rad or resolved.arm.home_rad, meanwhile=tend)
     return station
 
 

@@ -34,6 +34,7 @@ Torques: TypeAlias = tuple[Torque, Torque, Torque, Torque, Torque, Torque]
 Deviation: TypeAlias = Annotated[float, msgspec.Meta(ge=0.0, le=0.5)]
 OffNominal: TypeAlias = Annotated[float, msgspec.Meta(ge=0.0, le=100.0)]
 Share: TypeAlias = Annotated[float, msgspec.Meta(ge=0.0, le=1.0)]
+Whole: TypeAlias = Annotated[int, msgspec.Meta(ge=0, lt=1 << 63)]
 Bits: TypeAlias = Annotated[int, msgspec.Meta(ge=0, lt=1 << N_DIGITAL)]
 Lines: TypeAlias = Annotated[int, msgspec.Meta(ge=1, le=1000)]
 
@@ -75,6 +76,7 @@ class Faults:
             "inputs": self.force_inputs,
             "jog": self.jog,
             "late": self.late_ticks,
+            "lay_out": self.lay_out,
             "log": self.log,
             "noise": self.noise,
             "payload": self.payload,
@@ -216,6 +218,10 @@ class Faults:
         """
         refusal = self._robot.jog(np.array(rad))
         return {} if refusal is None else {"refusal": f"jog: {refusal}"}
+
+    def lay_out(self, seed: Whole, epoch: Whole) -> None:
+        """Let somebody's hands lay the table out as an epoch's reset would; the arm stays, with no program."""
+        self._robot.lay_out(seed=seed, epoch=epoch, digital_out=self._robot.machine.io.digital_out, keeps_arm=True)
 
     def force_inputs(self, bits: Bits = 0) -> None:
         """Let these digital inputs be on, whatever the table says."""

@@ -137,8 +137,14 @@ class VirtualRobot:
         """Whether no program runs and the arm is at rest."""
         return self.machine.modes.runtime is RuntimeState.STOPPED and self.machine.drive.is_standing
 
-    def lay_out(self, *, seed: int, epoch: int, digital_out: int) -> None:
+    def lay_out(self, *, seed: int, epoch: int, digital_out: int, keeps_arm: bool = False) -> None:
         """Draw and place the table, the arm at its start, lids as the outputs say, the hand open (a reset).
+
+        Args:
+            seed: of the layout, with the epoch.
+            epoch: of the layout.
+            digital_out: outputs from now on.
+            keeps_arm: the arm stays where it is, as when a person's hands lay out a table.
 
         Raises:
             ValueError: a program runs, or the arm is under way: it would go on from somewhere else.
@@ -148,7 +154,8 @@ class VirtualRobot:
             raise ValueError("expected no program and an arm at rest; stop the program first")
         world = machine.world
         layout = draw_layout(world.scenario, np.random.default_rng([seed, epoch]))
-        world.put(layout, self._kinematics.solve(layout.start_m, world.arm.home_rad), digital_out)
+        start_rad = self._kinematics.solve(layout.start_m, world.arm.home_rad)
+        world.put(layout, world.data.qpos[:6].tolist() if keeps_arm else start_rad, digital_out)
         machine.io.digital_out = self.box.put(digital_out)
         if not drive.is_braked:
             drive.engage()

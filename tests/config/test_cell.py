@@ -1,5 +1,7 @@
 """Cell files: every signal once, no terminal twice, pulses whole, and a terminal for all that a scenario has."""
 
+import re
+
 import pytest
 
 from config.cell import CellConfig
@@ -98,7 +100,8 @@ def test_lab_is_virtual_lab_camera_with_another_address_and_serial_a_real_camera
     virtual, lab = shipped_tree("rigs", "virtual_lab_camera"), shipped_tree("rigs", "lab")
     assert load_rig("lab").address is None
     differing = {key for key in virtual.keys() | lab.keys() if virtual.get(key) != lab.get(key)}
-    assert differing == {"name", "description", "address", "bus", "nodes", "expected", "camera", "operator", "reset"}
+    person = {"operator", "reset", "parked_rad"}
+    assert differing == {"name", "description", "address", "bus", "nodes", "expected", "camera"} | person
     same = {
         node["name"]: (node.get("kind"), node["command"][:2]) for node in virtual["nodes"] if node["name"] != "twin"
     }
@@ -106,3 +109,18 @@ def test_lab_is_virtual_lab_camera_with_another_address_and_serial_a_real_camera
         "hub": ("hub", ["node", "hub"])
     }
     assert [node["name"] for node in lab["nodes"] if node.get("is_by_hand")] == ["robot", "learning"]
+
+
+@pytest.mark.parametrize(
+    ("changed", "what"),
+    [
+        ({0: 6.2}, "parked_rad[0]"),  # inside of nothing: the joint's soft margin
+        ({1: -3.0}, "parked_rad"),  # the tool beyond its workspace
+        ({4: -1.0}, "parked_rad"),  # the hand aslant
+    ],
+)
+def test_where_an_arm_waits_for_a_person_is_inside_of_every_limit(tmp_path, changed, what):
+    tree = shipped_tree("rigs", "lab")
+    tree["parked_rad"] = [changed.get(i, angle) for i, angle in enumerate(tree["parked_rad"])]
+    with pytest.raises(ConfigError, match=re.escape(what)):
+        resolve(rig=write(tmp_path, "rig.yaml", tree))

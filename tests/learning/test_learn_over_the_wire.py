@@ -188,7 +188,7 @@ def test_workers_are_refused_where_there_is_one_arm(lab):
 @pytest.mark.slow
 def test_a_person_at_the_robot_nodes_terminal_arms_and_lays_the_table_out_while_the_arm_is_parked(lab_by_person):
     folder, controller, _ = lab_by_person
-    with attended(*lab_by_person) as (person, _):
+    with attended(*lab_by_person[:2]) as (person, _):
         code, _, said = autotelic(folder, *learn("run", "--epochs", "1"), timeout_s=240, said="\n")
     text = "".join(person.said)
     assert code == 0, said + text
@@ -206,7 +206,7 @@ def test_a_person_at_the_robot_nodes_terminal_arms_and_lays_the_table_out_while_
 @pytest.mark.slow
 def test_who_has_died_is_waited_for_no_longer_and_the_next_one_is_asked_for_anew(lab_by_person):
     folder, controller, _ = lab_by_person
-    with attended(*lab_by_person) as (person, _):
+    with attended(*lab_by_person[:2]) as (person, _):
         answer, is_there = person.answer, Event()
         is_there.set()
 

@@ -4,6 +4,7 @@ import re
 
 import pytest
 
+from config.loader import load_rig
 from tests.support.person_at_arm import attended
 from tests.support.small_lab import autotelic, controller_of, make_lab
 
@@ -13,11 +14,15 @@ HOST = "127.0.0.66"
 
 
 def test_what_a_person_laid_out_is_judged_by_what_the_camera_sees(tmp_path):
-    make_lab(tmp_path, HOST, rig="virtual_lab_camera", reset="person", operator="robot.person:PersonOperator")
+    parked_rad = load_rig("lab").parked_rad
+    make_lab(
+        tmp_path, HOST, rig="virtual_lab_camera", reset="person", operator="robot.person:PersonOperator",
+        parked_rad=list(parked_rad),
+    )  # fmt: skip
     (tmp_path / "fast.yaml").write_text(FAST)
     with (
         controller_of(tmp_path, HOST, scenario="paper") as controller,
-        attended(tmp_path, controller, HOST, scenario="paper", kinds=("camera", "perception")) as (person, _),
+        attended(tmp_path, controller, scenario="paper", kinds=("camera", "perception")) as (person, _),
     ):
         code, _, said = autotelic(
             tmp_path, "learn", "--rig", "rig.yaml", "--scenario", "paper", "--preset", "fast.yaml", "--out", "run",
@@ -26,7 +31,7 @@ def test_what_a_person_laid_out_is_judged_by_what_the_camera_sees(tmp_path):
     text = "".join(person.said)
     assert code == 0, said + text
     assert re.search(r"not in place: \w+: \d+ mm off", text), "the first table was drawn for another epoch"
-    assert "everything is in place" in text
+    assert "everything that can be seen is in place; red_cylinder is taken on your word to be in red_box" in text
 
 
 FAST = """\

@@ -3,6 +3,7 @@
 import math
 from types import SimpleNamespace
 
+import msgspec
 import numpy as np
 import pytest
 
@@ -10,7 +11,7 @@ from config.loader import resolve
 from perception.ground_truth import GroundTruthPerception
 from robot.errors import NotEngagedError
 from robot.messages import Heading, ObjectPose, SceneState
-from robot.person_reset import PersonResetter, misplaced
+from robot.person_reset import PersonResetter, misplaced, unseen_under_lids
 from robot.person_station import PersonResetStation
 from robot.rigs import build_plant
 from robot.tick_loop import TickLoop
@@ -95,7 +96,36 @@ def test_a_thing_is_in_place_within_ten_millimetres(lab):
         shifted = layout.fixtures_m | {"green_button": (x + away_m, y)}
         moved = type(layout)(fixtures_m=shifted, cylinders=layout.cylinders, start_m=layout.start_m)
         assert len(misplaced(moved, scene, SCENARIO)) == n_off
-    assert misplaced(layout, type(scene)(stamp_ns=0, objects=scene.objects[1:]), SCENARIO)[0].endswith("not perceived")
+    assert "orange_button: not perceived" in misplaced(layout, without(scene, "orange_button"), SCENARIO)[0]
+
+
+def without(scene, *names):
+    return type(scene)(stamp_ns=0, objects=tuple(thing for thing in scene.objects if thing.name not in names))
+
+
+def test_what_a_lid_hides_is_taken_on_a_persons_word_and_nothing_else_is(lab):
+    _, resetter, person, _ = lab
+    layout = resetter.layout_of(seed=SEED, epoch=EPOCH)
+    person.plant.resetter.reset(seed=SEED, epoch=EPOCH, digital_out=0)
+    scene = person.plant.truth.read()
+    assert unseen_under_lids(scene, SCENARIO) == {}
+    hidden = without(scene, "red_cylinder")
+    assert misplaced(layout, hidden, SCENARIO) == []
+    assert unseen_under_lids(hidden, SCENARIO) == {"red_cylinder": "red_box"}
+    open_topped = [msgspec.structs.replace(box, lid=None) for box in SCENARIO.boxes]
+    no_lids = msgspec.structs.replace(SCENARIO, boxes=tuple(open_topped))
+    assert unseen_under_lids(hidden, no_lids) == {}
+    assert "red_cylinder: not perceived" in misplaced(layout, hidden, no_lids)[0]
+
+
+def test_what_nobody_can_see_is_named_to_the_person(lab):
+    station, resetter, person, _ = lab
+    station.arm(by="the test")
+    station.engage()
+    read = resetter._scene.read
+    resetter._scene = SimpleNamespace(read=lambda: without(read(), "blue_cylinder"))
+    station.reset(seed=SEED, epoch=EPOCH)
+    assert "blue_cylinder is taken on your word to be in blue_box" in person.asked[-1]
 
 
 @pytest.mark.parametrize(

@@ -9,9 +9,8 @@ from threading import Thread
 
 import numpy as np
 
-from config.loader import load_arm
-from robot.bus import RESET, Bus, ResetRequest, Role
-from tests.support.small_lab import SERIAL, start
+from config.loader import load_arm, load_rig
+from tests.support.small_lab import start
 
 __all__ = ["AtTheArm", "attended"]
 
@@ -19,10 +18,10 @@ __all__ = ["AtTheArm", "attended"]
 class AtTheArm:
     """Sits at the robot node's terminal: presses Enter, types codes, and lays the table out when told what is off."""
 
-    def __init__(self, folder, controller, bus):
-        self.folder, self.controller, self.bus = folder, controller, bus
+    def __init__(self, folder, controller):
+        self.folder, self.controller = folder, controller
         self.said, self.parked_rad = [], []
-        self.home = np.array(load_arm("ur5e").home_rad)
+        self.parked = np.array(load_rig(folder / "rig.yaml").parked_rad or load_arm("ur5e").home_rad)
         self.asked = None
 
     def answer(self, line):
@@ -37,11 +36,11 @@ class AtTheArm:
         if asked:
             truth = self.controller.fault("truth")
             assert truth["runtime"] == "STOPPED", "a person reaches in: nobody may be in command"
-            self.parked_rad.append(np.abs(np.array(truth["q_rad"]) - self.home).max())
+            self.parked_rad.append(np.abs(np.array(truth["q_rad"]) - self.parked).max())
             assert (self.folder / asked[3]).read_bytes()[:4] == b"\x89PNG"
             self.asked = asked
         elif "put right" in line:
-            self.bus.asker(RESET).ask(ResetRequest(seed=int(self.asked[2]), epoch=int(self.asked[1]), digital_out=0))
+            self.controller.fault("lay_out", seed=int(self.asked[2]), epoch=int(self.asked[1]))
         return ""
 
     def await_said(self, words, *, timeout_s=90.0):
@@ -61,12 +60,10 @@ class AtTheArm:
 
 
 @contextmanager
-def attended(folder, controller, host, *, scenario="small.yaml", kinds=("perception",)):
+def attended(folder, controller, *, scenario="small.yaml", kinds=("perception",)):
     """Run the nodes of a lab, with a person at the robot node's terminal."""
-    bus = Bus(f"tcp/{host}:7447", serial=SERIAL, role=Role.LEARNING, source="hand")
-    bus.open()
     node = ("--rig", "rig.yaml", "--scenario", scenario)
-    person = AtTheArm(folder, controller, bus)
+    person = AtTheArm(folder, controller)
     with ExitStack() as stack:
         others = [stack.enter_context(start(folder, "node", kind, *node, stdin=subprocess.DEVNULL)) for kind in kinds]
         robot = stack.enter_context(start(folder, "node", "robot", *node, stdin=subprocess.PIPE))
@@ -81,4 +78,3 @@ def attended(folder, controller, host, *, scenario="small.yaml", kinds=("percept
             for process in (robot, *others):
                 process.wait(timeout=20)
             attends.join()
-            bus.close()

@@ -61,8 +61,8 @@ def make_lab(folder, host, *, cell=None, rig="virtual_lab", **changes):
 
 def controller_of(folder, host, **settings):
     """Return the virtual controller of a lab, not yet started."""
-    chosen = {"bus": f"tcp/{host}:7447"} | settings
-    return ControllerProcess(Setup(host=host, scenario=str(folder / "small.yaml"), **chosen))
+    chosen = {"bus": f"tcp/{host}:7447", "scenario": str(folder / "small.yaml")} | settings
+    return ControllerProcess(Setup(host=host, **chosen))
 
 
 def start(folder, *arguments, **popen):
