@@ -28,6 +28,8 @@ ANSWER_S, AGAIN_S = 0.015, 0.05
 FIRST_S, N_FIRST = 5.0, 3
 """How long a perception node may be away while the arm rests, and how many percepts tell of a table that was just laid
 out."""
+PAUSE_S, FRESH_S = 0.5, 1.0
+"""An arm of which nobody wanted a percept for so long rests: then one is waited for, for so long."""
 
 
 class RemotePerception:
@@ -53,7 +55,7 @@ class RemotePerception:
         self._came = Condition()
         self._newest: Received[Percept] | None = None
         self._n = 0
-        self._is_new_table = True
+        self._is_new_table, self._looked_ns = True, now_ns()
         self._forgets = bus.asker(FORGET)
         self._subscriber = bus.subscriber(PERCEPT, self._take)
 
@@ -75,8 +77,12 @@ class RemotePerception:
         """
         del scene  # the perception node has it
         is_new_table, self._is_new_table = self._is_new_table, False
+        is_paused = self._now_ns() - self._looked_ns > PAUSE_S * 1e9
         if is_new_table:
             arm = self._await_table()
+        elif is_paused:
+            arm = self._await_fresh(arm)
+        self._looked_ns = self._now_ns()
         self._tell(arm)
         with self._came:
             self._came.wait_for(lambda: self._is_at(arm), ANSWER_S)
@@ -112,6 +118,20 @@ class RemotePerception:
             with self._came:
                 self._came.wait_for(lambda: self._is_settled(wanted), AGAIN_S)
         return self._measure()
+
+    def _await_fresh(self, arm: ArmState) -> ArmState:
+        """Wait for a percept of now, and return the arm as it is then: whoever perceives was not asked for a while."""
+        end_ns = self._now_ns() + round(FRESH_S * 1e9)
+        while not self._is_fresh() and self._now_ns() < end_ns and not self._gives_up():
+            self._tell(arm)
+            with self._came:
+                self._came.wait_for(self._is_fresh, AGAIN_S)
+            arm = self._measure()
+        return arm
+
+    def _is_fresh(self) -> bool:
+        newest = self._newest
+        return newest is not None and self._now_ns() - newest.stamp_ns <= self._deadline_ns
 
     def _is_settled(self, wanted: int) -> bool:
         """Whether so many percepts came, and the newest shows a table: a camera needs a frame of it first."""

@@ -34,7 +34,7 @@ Torques: TypeAlias = tuple[Torque, Torque, Torque, Torque, Torque, Torque]
 Deviation: TypeAlias = Annotated[float, msgspec.Meta(ge=0.0, le=0.5)]
 OffNominal: TypeAlias = Annotated[float, msgspec.Meta(ge=0.0, le=100.0)]
 Share: TypeAlias = Annotated[float, msgspec.Meta(ge=0.0, le=1.0)]
-Whole: TypeAlias = Annotated[int, msgspec.Meta(ge=0, lt=1 << 63)]
+Whole: TypeAlias = Annotated[int, msgspec.Meta(ge=0, le=(1 << 63) - 1)]
 Bits: TypeAlias = Annotated[int, msgspec.Meta(ge=0, lt=1 << N_DIGITAL)]
 Lines: TypeAlias = Annotated[int, msgspec.Meta(ge=1, le=1000)]
 

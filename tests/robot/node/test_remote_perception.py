@@ -11,7 +11,7 @@ from robot.bus.errors import BusError
 from robot.bus.inlet import Received
 from robot.bus.topics import FORGET, PERCEPT
 from robot.errors import StaleStateError
-from robot.node.remote_perception import RemotePerception
+from robot.node.remote_perception import PAUSE_S, RemotePerception
 from robot.station_doors import Perceives, Sighted
 from tests.support.stations import arm_state, fake_rig, percept
 
@@ -207,3 +207,26 @@ def test_of_a_new_table_percepts_are_waited_for_until_one_knows_where_anything_i
     air = Air(answer)
     assert air.remote.perceive(arm(air), None).objects[0].is_valid
     assert len(told) == 8
+
+
+def test_after_a_pause_a_percept_of_now_is_waited_for_and_in_motion_none_is():
+    """Nobody is asked while an arm waits for a person: what was perceived last is of before."""
+
+    def late(air, state):  # what comes is seen a while after it was asked for
+        air.now_ns += 120_000_000
+        if len(air.told) > 3:
+            answer_at_once(air, state)
+
+    air = settled(Air(late))
+    air.put(percept(PLACES, tcp_m=(0.4, 0.0, 0.2)), seen_ns=air.now_ns - 10 * DEADLINE_NS)
+    air.remote._looked_ns = air.now_ns - round(PAUSE_S * 1e9) - 1
+    found = air.remote.perceive(arm(air), None)
+    assert air.now_ns - found.stamp_ns < DEADLINE_NS
+    assert len(air.told) > 3
+    air.now_ns += DEADLINE_NS + 1
+    air._answer = lambda air, _: None
+    air.remote._looked_ns = air.now_ns - round(PAUSE_S * 1e9)
+    n = len(air.told)
+    with pytest.raises(StaleStateError):
+        air.remote.perceive(arm(air), None)
+    assert len(air.told) == n + 1

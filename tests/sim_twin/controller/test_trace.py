@@ -5,9 +5,11 @@ from time import monotonic
 import numpy as np
 import pytest
 
+from robot.layout import draw_layout
 from sim_twin.controller import trace as traces
 from sim_twin.controller.faults import FaultError, Faults
 from sim_twin.controller.trace import TraceWriter, read_trace
+from sim_twin.names import on_table
 from tests.support.virtual_robot import make_robot, run
 
 
@@ -76,3 +78,20 @@ def test_a_jog_moves_the_joints_by_as_much(robot, faults):
     assert robot.machine.world.data.qpos[:6] - before == pytest.approx([0.1, 0, 0, 0, 0, -0.1], abs=2e-3)
     with pytest.raises(FaultError, match="length 6"):
         faults.apply("jog", rad=[0.1])
+
+
+def test_hands_lay_the_table_out_around_an_arm_that_stays_and_only_while_no_program_runs(robot, faults):
+    run(robot, 20)
+    world, before = robot.machine.world, robot.machine.drive.measured.q_rad.copy()
+    faults.apply("lay_out", seed=5, epoch=2)
+    run(robot, 20)
+    layout = draw_layout(world.scenario, np.random.default_rng([5, 2]))
+    for name, place in layout.fixtures_m.items():
+        assert world.model.body(on_table(name)).pos[:2] == pytest.approx(place)
+    assert np.abs(robot.machine.drive.measured.q_rad - before).max() < 1e-3
+    robot.submit_script("def going():\n while True:\n  sync()\n end\nend\n")
+    run(robot, 5)
+    with pytest.raises(FaultError, match="stop the program first"):
+        faults.apply("lay_out", seed=5, epoch=3)
+    with pytest.raises(FaultError, match="seed"):
+        faults.apply("lay_out", seed=-1, epoch=0)
