@@ -5,14 +5,17 @@ from collections.abc import Callable
 
 from robot.errors import SafetyError
 from robot.local_station import LocalStation
-from robot.messages import Heading, Intent, JointTarget, Percept, StepResult, Vec3, Vec6
+from robot.messages import Heading, Hold, Intent, JointTarget, Percept, StepResult, Vec3, Vec6
 from robot.person_reset import PersonResetter
 
 __all__ = ["PersonResetStation"]
 
-PARK_RAD_S = 0.3
-"""No joint is asked to go faster on the way to where the arm waits."""
-NEAR_M, NEAR_RAD = 0.003, 0.01
+SLOW_RAD_S, SLOW_M_S = 0.2, 0.1
+"""What joints on the way to where the arm waits, and the tool on the way up and to the start, are asked for at most.
+Whoever lays the table out sits beside it. What sets out and stops anew each time step goes half as fast again."""
+EASE = 0.2
+"""Share of the way left that is asked for in one time step: asked for all of it, a tool that lags swings to and fro."""
+NEAR_M, NEAR_RAD, STILL_RAD_S = 0.003, 0.01, 0.02
 MOST_S = 60.0
 
 
@@ -41,23 +44,30 @@ class PersonResetStation(LocalStation):
         return self._go_to(self._by_person.layout_of(seed=seed, epoch=epoch).start_m, percept)
 
     def _park(self) -> None:
-        """Rise, then go to where the arm waits."""
+        """Come to rest, rise, and go to where the arm waits."""
+        self._come_to_rest()
         top_m = self.spec.heights_m[1]
         state = self._rise(top_m)
-        step_rad = PARK_RAD_S * self.spec.step_s
+        step_rad = SLOW_RAD_S * self.spec.step_s
         farthest = max(abs(b - a) for a, b in zip(state, self._parked_rad, strict=True))
         n_steps = max(1, math.ceil(farthest / step_rad))
         for k in range(1, n_steps + 1):
             self._carry_out(JointTarget(q_rad=_between(state, self._parked_rad, k / n_steps)))
         self._wait_for(self._parked_rad)
 
+    def _come_to_rest(self) -> None:
+        for _ in range(self._most_steps):
+            self._carry_out(Hold())
+            if max(abs(v) for v in self._measured.qd_rad_s) < STILL_RAD_S:
+                return
+
     def _rise(self, height_m: float) -> Vec6:
         """Go straight up and return the joints there."""
-        result = self._carry_out(Heading(heading_rad=0.0, distance_m=0.0, height_m=height_m))
         for _ in range(self._most_steps):
-            if result.percept.tcp_position_m[2] - self.spec.table_height_m > height_m - NEAR_M:
+            x, y, z = self._measured.tcp_position_m
+            percept = self._step_towards((x, y, height_m + self.spec.table_height_m), (x, y, z), is_straight_up=True)
+            if percept.tcp_position_m[2] - self.spec.table_height_m > height_m - NEAR_M:
                 break
-            result = self._carry_out(Heading(heading_rad=0.0, distance_m=0.0, height_m=height_m))
         return self._measured.q_rad
 
     def _wait_for(self, q_rad: Vec6) -> None:
@@ -68,16 +78,27 @@ class PersonResetStation(LocalStation):
         raise SafetyError("parking: expected the arm parked within a minute, it is not: is something in its way?")
 
     def _go_to(self, place_m: Vec3, percept: Percept) -> Percept:
-        """Go to a place in straight steps of half the most that a step may have."""
+        """Go to a place, as high as intents may ask for."""
+        lowest_m, top_m = self.spec.heights_m
+        height_m = min(max(place_m[2] - self.spec.table_height_m, lowest_m), top_m)
+        there_m = (place_m[0], place_m[1], height_m + self.spec.table_height_m)
         for _ in range(self._most_steps):
-            x, y, z = (b - a for a, b in zip(percept.tcp_position_m, place_m, strict=True))
-            if math.hypot(x, y, z) < NEAR_M:
+            if math.dist(percept.tcp_position_m, there_m) < NEAR_M:
                 return percept
-            distance_m = min(math.hypot(x, y), self.spec.max_step_m / 2)
-            height_m = place_m[2] - self.spec.table_height_m
-            intent = Heading(heading_rad=math.atan2(y, x), distance_m=distance_m, height_m=height_m)
-            percept = self._carry_out(intent).percept
+            percept = self._step_towards(there_m, percept.tcp_position_m)
         raise SafetyError("start: expected the tool at the drawn start within a minute, it is not: look what holds it")
+
+    def _step_towards(self, there_m: Vec3, here_m: Vec3, *, is_straight_up: bool = False) -> Percept:
+        """Ask for one slow step towards a place; in height for two, for that is told outright and not by how much."""
+        x, y, z = (b - a for a, b in zip(here_m, there_m, strict=True))
+        most_m = min(SLOW_M_S * self.spec.step_s, self.spec.max_step_m)
+        distance_m = 0.0 if is_straight_up else min(EASE * math.hypot(x, y), most_m)
+        height_m = here_m[2] + min(max(z, -2 * most_m), 2 * most_m) - self.spec.table_height_m
+        lowest_m, top_m = self.spec.heights_m
+        intent = Heading(
+            heading_rad=math.atan2(y, x), distance_m=distance_m, height_m=min(max(height_m, lowest_m), top_m)
+        )
+        return self._carry_out(intent).percept
 
     def _carry_out(self, intent: Intent) -> StepResult:
         self._meanwhile()

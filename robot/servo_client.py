@@ -158,12 +158,17 @@ class ServoClient:
     def engage(self) -> None:
         """Take command of the arm; a process that has ended is started anew, and what was lost before is forgotten."""
         self.connect()
-        self._told = self._why_lost = None
+        self._told = None
         assert self._watch is not None, "connecting sets it"
-        with self._taking.watched(end=self._watch.kill, is_gone=lambda: self._is_gone) as alarm:
-            self._overhear()
-            self._exchange(Engage(), Done, ENGAGE_S, alarm=alarm)
-        self._is_in_command = True
+        try:
+            with self._taking.watched(end=self._watch.kill, is_gone=lambda: self._is_gone) as alarm:
+                self._overhear()
+                self._exchange(Engage(), Done, ENGAGE_S, alarm=alarm)
+        except RobotError as error:
+            if self._is_gone and self._taking.uploaded[0]:
+                self._note_loss(str(error))
+            raise
+        self._is_in_command, self._why_lost = True, None
 
     def stop(self) -> None:
         """Stop the arm and give up command; return once it rests, or at once where it is lost.

@@ -56,6 +56,7 @@ PAUSE_NS, HAND_NS = 50_000_000, 40_000_000
 """After such a pause what the hand said last is of before; and so long its next word is waited for."""
 REST_S, STILL_RAD_S = 1.0, 0.01
 START_S = 2.0
+NOT_ENDED = "and nobody confirms that the program has ended which was to obey: look at the arm's pendant"
 
 
 class RtdeArm:
@@ -131,7 +132,7 @@ class RtdeArm:
 
         Raises:
             ArmRefusedError: the arm is not ready, or belongs to somebody else, or its watchdog does not work.
-            StaleStateError: this process lost its link, before or now.
+            StaleStateError: this process lost its link, before or now; or what it began is not confirmed to have ended.
             WireError: somebody does not answer.
         """
         if self.links.is_lost:
@@ -152,11 +153,13 @@ class RtdeArm:
         try:
             with named("RTDE control", self.address):
                 self._command.take(HeedingClock(self.clock, self._heed_stop))
-        except BaseException:
-            # An arm that was set up by half is nobody's: the next engage begins anew.
+        except BaseException as error:
+            # An arm that was set up by half is nobody's: the next engage begins anew, where the program has ended.
             self._require_link()
-            self._command.drop(self.clock, is_in_traceback=True)
-            raise
+            if self._command.drop(self.clock, is_in_traceback=True):
+                raise
+            self.links.is_lost = True
+            raise StaleStateError(f"{error or type(error).__name__}; {NOT_ENDED}") from error
 
     # ------------------------------------------------------------------------------------------------ read and write
 

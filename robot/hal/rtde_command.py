@@ -70,8 +70,8 @@ class RtdeCommand:
         self.outputs: DigitalOutputs | None = None
         self._primary = PrimaryWatch(address, tool=(*tool.tcp_m, 0.0, 0.0, 0.0))
         self._obedience, self._n_looks = Obedience(), 0
-        self._has_ended = False
-        """Our program was seen to have ended: whatever runs after that is somebody else's."""
+        self._was_seen = self._has_ended = False
+        """Our program was seen to run since it was uploaded, and to have ended: what runs after that is not ours."""
 
     def take(self, clock: Clock) -> None:
         """Upload the program, have its watchdog proven, upload it anew, set payload and tool, arm the watchdog last.
@@ -97,11 +97,11 @@ class RtdeCommand:
         self.control = self._connected()
         self._set_up(self.control, receive, clock)
         self._links.require()
-        self._has_ended = False
 
     def note(self, runtime: int) -> None:
-        """Take note of a runtime state that was read."""
-        self._has_ended |= runtime in (Runtime.STOPPING, Runtime.STOPPED)
+        """Take note of a runtime state that was read: of our program's, once that was seen to run."""
+        self._was_seen |= self.control is not None and runtime == Runtime.PLAYING
+        self._has_ended |= self._was_seen and runtime in (Runtime.STOPPING, Runtime.STOPPED)
 
     def is_replaced(self) -> bool:
         """Look whether somebody else's program runs where ours did: it is not ours to end, and answers us nothing."""
@@ -241,6 +241,7 @@ class RtdeCommand:
     def _connected(self) -> RTDEControlInterface:
         probe_upload(self._address)
         self._links.when_uploading()
+        self._was_seen = self._has_ended = False
         with self._in_time():
             control = RTDEControlInterface(self._address, RATE_HZ, RTDEControlInterface.FLAG_UPLOAD_SCRIPT)
         self._links.look()

@@ -9,10 +9,11 @@ import pytest
 
 from config.loader import resolve
 from perception.ground_truth import GroundTruthPerception
-from robot.errors import NotEngagedError
+from robot.errors import NotEngagedError, SafetyError
+from robot.layout import draw_layout
 from robot.messages import Heading, ObjectPose, SceneState
 from robot.person_reset import PersonResetter, misplaced, unseen_under_lids
-from robot.person_station import PersonResetStation
+from robot.person_station import SLOW_M_S, SLOW_RAD_S, PersonResetStation
 from robot.rigs import build_plant
 from robot.tick_loop import TickLoop
 
@@ -21,12 +22,12 @@ SCENARIO = resolve().scenario
 
 
 class ScriptedPerson:
-    """Does nothing at the first key; at the second lays the table out as the twin's own reset does."""
+    """Does nothing at the first key; at the second lays the table out, and touches no arm."""
 
     def __init__(self, plant, home_rad):
         self.plant, self.home_rad = plant, np.array(home_rad)
         self.asked, self.told, self.away_rad = [], [], []
-        self.at_key = lambda n: None
+        self.at_key, self.seed = lambda n: None, SEED
 
     def tell(self, text):
         self.told.append(text)
@@ -36,8 +37,13 @@ class ScriptedPerson:
         if len(self.asked) == 1:
             self.away_rad.append(np.abs(np.array(self.plant.arm.read().q_rad) - self.home_rad).max())
         if len(self.asked) == 2:
-            self.plant.resetter.reset(seed=SEED, epoch=EPOCH, digital_out=self.plant.arm.read().digital_out)
+            self.lay_out(self.seed)
         self.at_key(len(self.asked))
+
+    def lay_out(self, seed):
+        world = self.plant.world
+        layout = draw_layout(SCENARIO, np.random.default_rng([seed, EPOCH]))
+        world.put(layout, world.data.qpos[:6].tolist(), self.plant.arm.read().digital_out)
 
 
 @pytest.fixture
@@ -175,3 +181,56 @@ def test_a_stop_that_nobody_confirmed_is_not_called_disarmed(lab, monkeypatch):
     person.asked.clear()
     resetter.reset(seed=SEED, epoch=EPOCH, digital_out=0)
     assert person.asked[0].startswith("NOT CONFIRMED that nothing runs on the arm (stop: nobody confirms it)")
+
+
+@pytest.mark.parametrize("seed", [3, 8])
+def test_on_its_way_from_and_to_a_person_the_arm_is_slow(lab, seed):
+    station, _, person, _ = lab
+    station.arm(by="the test")
+    station.engage()
+    for _ in range(20):
+        station.step(Heading(heading_rad=-2.0, distance_m=0.02, height_m=0.05))
+    station._come_to_rest()
+    person.seed, speeds, tick = seed, [], person.plant.world.clock.wait_tick
+
+    def watched():
+        tick()
+        state = person.plant.arm.read()
+        speeds.append((max(map(abs, state.qd_rad_s)), math.hypot(*state.tcp_speed_m_s)))
+
+    person.plant.world.clock.wait_tick = watched
+    station.reset(seed=seed, epoch=EPOCH)
+    fastest_rad_s, fastest_m_s = map(max, zip(*speeds, strict=True))
+    assert SLOW_RAD_S < fastest_rad_s < 0.5
+    assert SLOW_M_S < fastest_m_s < 0.15
+
+
+def test_before_a_person_is_asked_the_arm_is_stopped_and_its_rest_awaited(tmp_path):
+    said = []
+    loop = SimpleNamespace(stop=lambda: said.append("stop"), await_rest=lambda: said.append("rest"), why_lost=None)
+    person = SimpleNamespace(tell=said.append, await_key=lambda text: said.append(text) or stop_asking())
+    scene = SimpleNamespace(read=lambda: said.append("look"))
+    resetter = PersonResetter(scenario=SCENARIO, loop=loop, scene=scene, person=person, pictures=tmp_path)
+    with pytest.raises(SafetyError, match="nobody"):
+        resetter.reset(seed=SEED, epoch=EPOCH, digital_out=0)
+    assert said[:2] == ["stop", "rest"]
+    assert len(said) == 3
+
+
+def stop_asking():
+    raise SafetyError("nobody is at the arm")
+
+
+def test_a_start_that_is_drawn_higher_than_intents_may_ask_for_is_gone_to_as_high_as_they_may(lab):
+    station, resetter, person, _ = lab
+    station.arm(by="the test")
+    station.engage()
+    seed = next(s for s in range(100) if resetter.layout_of(seed=s, epoch=EPOCH).start_m[2] > top_m(station) + 0.003)
+    person.seed = seed
+    percept = station.reset(seed=seed, epoch=EPOCH)
+    x, y, _ = resetter.layout_of(seed=seed, epoch=EPOCH).start_m
+    assert np.linalg.norm(np.subtract(percept.tcp_position_m, (x, y, top_m(station)))) < 0.005
+
+
+def top_m(station):
+    return station.spec.table_height_m + station.spec.heights_m[1]
