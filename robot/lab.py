@@ -6,7 +6,7 @@ from config.limited import limited
 from config.resolved import Resolved
 from config.rig import Rig
 from robot.bus import Bus, Role
-from robot.bus.errors import NoHubError
+from robot.bus.errors import BusError, NoHubError
 from robot.bus.topics import ARM_STATE
 from robot.bus.twin_link import RemoteResetter, RemoteTruth
 from robot.errors import RobotConfigError
@@ -89,14 +89,15 @@ def build_lab_station(resolved: Resolved, perception: Perceives, *, is_driven: b
 def join_robot_node(resolved: Resolved, *, is_driven: bool = False) -> RemoteStation | None:
     """Return the station of the robot node on the rig's bus, disarmed for this process; None where there is none.
 
-    Where a person drives, and lays the table out too, there need be no bus either.
+    Where a person drives, and lays the table out too, there need be no bus either, unless a process on it perceives.
 
     Args:
         resolved: the rig, and the table that is expected there.
         is_driven: a person drives.
 
     Raises:
-        BusError: nobody listens at the bus's endpoint, or there is a robot node that does not answer.
+        BusError: nobody listens at the bus's endpoint, or there is a robot node that does not answer; or there is none,
+            on a rig whose table a person lays out: he may be at it.
         RobotConfigError: the robot node has another table, or holds other limits.
     """
     rig = resolved.rig
@@ -106,12 +107,14 @@ def join_robot_node(resolved: Resolved, *, is_driven: bool = False) -> RemoteSta
     try:
         bus.open()
     except NoHubError:
-        if is_driven and rig.reset == "person":
+        if is_driven and rig.reset == "person" and not is_fed(rig):
             return None  # nothing else of the rig runs: who drives holds the arm himself
         raise
     try:
         asker = NodeAsker(bus, wait_s=AWAY_S, tell=lambda line: typer.echo(line, err=True))
         if not asker.is_anybody():
+            if is_driven:
+                _require_nobody_at_table(rig)
             bus.close()
             return None
         station = RemoteStation(bus, asker=asker, is_driven=is_driven)
@@ -120,6 +123,15 @@ def join_robot_node(resolved: Resolved, *, is_driven: bool = False) -> RemoteSta
         bus.close()
         raise
     return station
+
+
+def _require_nobody_at_table(rig: Rig) -> None:
+    """Raise BusError where a person may be at the table, at the word of a robot node that stands still."""
+    if rig.reset == "person":
+        raise BusError(
+            f"robot node: expected the one that holds the arm of {rig.name} to answer at {rig.bus}, none did; "
+            "start `autotelic node robot` in a terminal beside the arm, or see why it stands still"
+        )
 
 
 def _driven_station(resolved: Resolved, perception: Perceives) -> LocalStation:

@@ -11,6 +11,7 @@ import msgspec
 
 from config.resolved import Resolved
 from robot.errors import NotEngagedError, RobotError, StaleStateError, WireError
+from robot.hal.sole_holder import SoleHolder
 from robot.messages import ArmState, GripCommand, Intent, PlantIdentity, Vec3
 from robot.servo_failures import cut_short, error_of
 from robot.servo_messages import (
@@ -73,6 +74,7 @@ class ServoClient:
         self._resolved_json = msgspec.json.encode(resolved)
         self._tick_s = resolved.rig.tick_s
         self._taking = Taking(resolved.rig.address)
+        self._sole = None if resolved.rig.address is None else SoleHolder(resolved.rig.address)
         self._process: BaseProcess | None = None
         self._connection: Connection | None = None
         self._watch: ServoWatch | None = None
@@ -128,15 +130,26 @@ class ServoClient:
         """What leads to the process, for whoever checks what it makes of a station gone wrong; None without one."""
         return self._connection
 
+    def hold(self) -> None:
+        """Have no other process of this machine hold the arm, from now until this client is closed.
+
+        Raises:
+            WireError: another one does.
+        """
+        if self._sole is not None:
+            self._sole.take()
+
     def connect(self) -> None:
         """Start the process, where none runs, and let it acquire the arm. Moves nothing.
 
         Raises:
-            RobotError: the arm could not be acquired; the process has ended again.
+            RobotError: the arm could not be acquired; the process has ended again. Or another one of this machine
+                holds it.
         """
         self._overhear()
         if not self._is_gone:
             return
+        self.hold()
         self.await_rest()
         self._taking.wait()
         ours, theirs = self._context.Pipe()
@@ -271,6 +284,8 @@ class ServoClient:
             self._end()
         finally:
             self._taking.wait()
+            if self._sole is not None:
+                self._sole.release()
             when_closed, self._when_closed = self._when_closed, None
             if when_closed is not None:
                 when_closed()

@@ -48,7 +48,7 @@ def open_robot_node(resolved: Resolved, *, pictures: Path = Path("resets")) -> G
 
     Raises:
         RobotConfigError: the rig has no bus.
-        BusError: nobody listens at its endpoint.
+        WireError: nobody listens at its endpoint, or another process of this machine holds the arm.
     """
     rig, arm = resolved.rig, limited(resolved.arm, resolved.profile)
     check_usable(rig)
@@ -57,6 +57,8 @@ def open_robot_node(resolved: Resolved, *, pictures: Path = Path("resets")) -> G
     with ExitStack() as stack:
         bus = stack.enter_context(Bus(rig.bus, serial=rig.expected.serial, role=Role.ROBOT, keys=rig.keys))
         loop = ServoClient(resolved)
+        loop.hold()
+        stack.callback(loop.close)
         node: RobotNode
         perception: Perceives = (
             RemotePerception(

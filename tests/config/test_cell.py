@@ -100,7 +100,7 @@ def test_lab_is_virtual_lab_camera_with_another_address_and_serial_a_real_camera
     virtual, lab = shipped_tree("rigs", "virtual_lab_camera"), shipped_tree("rigs", "lab")
     assert load_rig("lab").address is None
     differing = {key for key in virtual.keys() | lab.keys() if virtual.get(key) != lab.get(key)}
-    person = {"operator", "reset", "parked_rad"}
+    person = {"operator", "profile", "reset", "parked_rad"}
     assert differing == {"name", "description", "address", "bus", "nodes", "expected", "camera"} | person
     same = {
         node["name"]: (node.get("kind"), node["command"][:2]) for node in virtual["nodes"] if node["name"] != "twin"

@@ -1,0 +1,48 @@
+"""One process of a machine holds an arm; its name goes with it, however it ends."""
+
+import os
+import signal
+import subprocess
+import sys
+
+import pytest
+
+from robot.errors import WireError
+from robot.hal.sole_holder import SoleHolder
+
+HOLDS = """
+from robot.hal.sole_holder import SoleHolder
+holder = SoleHolder("192.0.2.7")
+holder.take()
+print("held", flush=True)
+input()
+"""
+
+
+def test_another_process_is_refused_by_its_number_until_the_first_ends_even_where_it_stands_still():
+    with subprocess.Popen(
+        [sys.executable, "-c", HOLDS], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    ) as other:
+        assert other.stdout.readline() == "held\n"
+        ours = SoleHolder("192.0.2.7")
+        other.send_signal(signal.SIGSTOP)
+        with pytest.raises(WireError, match=rf"another process of this machine holds it \(process {other.pid}\)"):
+            ours.take()
+        elsewhere = SoleHolder("192.0.2.8")
+        elsewhere.take()
+        elsewhere.release()
+        os.kill(other.pid, signal.SIGKILL)
+    ours.take()
+    ours.take()
+    ours.release()
+    ours.release()
+
+
+def test_what_was_given_back_may_be_taken_by_another():
+    first, second = SoleHolder("192.0.2.9"), SoleHolder("192.0.2.9")
+    first.take()
+    with pytest.raises(WireError):
+        second.take()
+    first.release()
+    second.take()
+    second.release()
