@@ -38,6 +38,10 @@ class RigCamera(Section, frozen=True, kw_only=True):
     """How many frames a second are asked of it."""
     exposure: Annotated[float, Meta(ge=0.0, le=1e6)] | None = None
     """What a driver's exposure is locked at, in that driver's own unit (100 µs on Linux); None: by itself."""
+    recorded: Annotated[str, Meta(pattern=r"^(jpeg|png|none)\Z")] = "jpeg"
+    """How its frames are kept in sessions; PNG keeps each pixel, at some ten times the size."""
+    recorded_quality: Annotated[int, Meta(ge=1, le=100)] = 85
+    """Of a JPEG."""
 
 
 class NodeStart(Section, frozen=True, kw_only=True):

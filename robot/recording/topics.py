@@ -5,7 +5,7 @@ from typing import Any
 import msgspec
 
 from robot.bus.topic import Role, Topic
-from robot.bus.topics import ARM_STATE, PERCEPT, REQUESTED, SENT, TRUTH, VERDICT
+from robot.bus.topics import ARM_STATE, CAMERA_IMAGE, PERCEPT, REQUESTED, SENT, TRUTH, VERDICT
 from robot.recording.lanes import Lane
 from robot.recording.messages import (
     Asked,
@@ -19,7 +19,7 @@ from robot.recording.messages import (
     SubgoalChosen,
     TrialEvidence,
 )
-from robot.recording.viewer_messages import FrameTransforms, SceneUpdate
+from robot.viewer_messages import FrameTransforms, SceneUpdate
 
 __all__ = [
     "EPOCH", "EVENT", "EVIDENCE", "GOAL", "INTENT", "KEPT", "LANES", "RECORDED", "RESET_MARK", "SCENE", "STATION",
@@ -42,11 +42,13 @@ SCENE = Topic(name="scene", kind=SceneUpdate, writers=_ANY)
 
 RECORDED: tuple[Topic[Any], ...] = (
     ARM_STATE, REQUESTED, SENT, VERDICT, TRUTH, PERCEPT, STATION, RESET_MARK, INTENT, STEP, GOAL, SUBGOAL, EVIDENCE,
-    EPOCH, KEPT, EVENT, TF, SCENE,
+    EPOCH, KEPT, EVENT, TF, SCENE, CAMERA_IMAGE,
 )  # fmt: skip
-LANES = {topic.name: Lane.TICKS for topic in (ARM_STATE, REQUESTED, SENT, VERDICT, TRUTH)} | {
-    topic.name: Lane.VIEW for topic in (TF, SCENE)
-}
+LANES = (
+    {topic.name: Lane.TICKS for topic in (ARM_STATE, REQUESTED, SENT, VERDICT, TRUTH)}
+    | {topic.name: Lane.VIEW for topic in (TF, SCENE)}
+    | {CAMERA_IMAGE.name: Lane.FRAMES}
+)
 
 
 def as_on_the_bus(topic: Topic[Any], *, is_told: bool = False) -> Topic[Any]:

@@ -29,6 +29,7 @@ from robot.teleop.pace import WallPace
 from robot.teleop.preview import AheadPreview
 from robot.teleop.readout import ReadOut
 from robot.teleop.view import View
+from robot.tick_ring import ticks_of
 
 __all__ = ["DriveOptions", "Rearm", "run_drive"]
 
@@ -86,7 +87,7 @@ def run_drive(options: DriveOptions) -> None:
         recording = _open_recording(resolved, options, stack)
         tap = None if recording is None else recording.ticks
         station = stack.enter_context(find_station(resolved, is_driven=True, tap=tap))
-        driven: DrivenStation = station if recording is None else recording.drive(station)
+        driven: DrivenStation = station if recording is None else recording.drive(station, ticks=ticks_of(station))
         station.take_lease(f"teleop by {device.name}", life_ns=None if options.is_script else LEASE_NS)
         _arm(station, driven, resolved, seed=options.seed)
         view = _open_view(resolved, console, stack) if options.view else None
