@@ -17,7 +17,8 @@ from robot.bus import Bus, Received, Topic
 from robot.bus.account_rows import AccountPart, AccountWritten
 from robot.bus.errors import BusError
 from robot.bus.tick_rows import TickBatch
-from robot.bus.topics import ACCOUNT, TICKS, WRITTEN
+from robot.bus.topics import ACCOUNT, ARM_STATE, PERCEPT, TICKS, WRITTEN
+from robot.messages import ArmState
 from robot.node.pulse import Pulse
 from robot.recording.account_order import AccountOrder
 from robot.recording.errors import DamagedError
@@ -55,7 +56,9 @@ class BusRecorder:
         self._files, self._order = files, AccountOrder()
         self._is_told, self._is_open = False, False
         self._recording: Recording = files.watch()
-        self._ticks = ToldTicks(self._recording.recorder)
+        self._ticks = ToldTicks(self._recording.recorder, is_sure=self._recording.is_on_a_wire)
+        self._shown = self._recording.shown()
+        self._measured: ArmState | None = None
         self._came: Queue[Came] = Queue(MOST_WAITING)
         self._newest_ns = self._offset_ns = self._n_missed = 0
         self._written = AccountWritten(account=0, number=-1, is_open=False)
@@ -126,6 +129,11 @@ class BusRecorder:
             named, received.message, log_ns=self._newest_ns, stamp_ns=max(0, received.stamp_ns)
         )
         self.n += 1
+        if topic is ARM_STATE:
+            self._measured = received.message
+        elif topic is PERCEPT:
+            state = self._ticks.state or self._measured
+            self._shown.perceived(received.message, state, log_ns=self._newest_ns)
 
     def _take_ticks(self, received: Received[TickBatch]) -> None:
         try:
@@ -185,3 +193,4 @@ class BusRecorder:
         self._recording.close()
         self._recording, self._is_told = begun, True
         self._ticks.go_on(begun.recorder)
+        self._shown = begun.shown()

@@ -28,13 +28,16 @@ class BusListener:
         bus: open.
         recorder: takes it.
         topics: what is listened to.
+        is_on_a_wire: the arm is held by a process that tells every tick.
 
     Attributes:
         n: Messages recorded.
     """
 
-    def __init__(self, bus: Bus, recorder: Recorder, topics: Iterable[Topic[Any]]) -> None:
-        self._recorder, self._ticks = recorder, ToldTicks(recorder)
+    def __init__(
+        self, bus: Bus, recorder: Recorder, topics: Iterable[Topic[Any]], *, is_on_a_wire: bool = False
+    ) -> None:
+        self._recorder, self._ticks = recorder, ToldTicks(recorder, is_sure=is_on_a_wire)
         self._came: SimpleQueue[Came] = SimpleQueue()
         self._newest_ns = self.n = 0
         self._subscribers = [bus.subscriber(topic, partial(self._take, as_on_the_bus(topic))) for topic in topics]

@@ -23,6 +23,7 @@ from robot.recording.images import image_coder
 from robot.recording.messages import Purpose
 from robot.recording.picture import Picture
 from robot.recording.recorder import Recorder
+from robot.recording.shown import Shown
 from robot.recording.sink import Sink
 from robot.recording.taps import RecordedDrive, RecordedStation, RecordedTicks
 from robot.recording.told_ticks import TakenTicks
@@ -136,6 +137,15 @@ class Recording:
         if ticks is not None and self._now_ns is not None and self._taken is None:
             self._taken = TakenTicks(ticks, self.recorder)
         return None if ticks is None else self._taken
+
+    @property
+    def is_on_a_wire(self) -> bool:
+        """Whether its arm is held by a process that tells every tick."""
+        return self._resolved.rig.bus is not None
+
+    def shown(self) -> Shown:
+        """Return what draws for viewers what is heard of over a bus."""
+        return Shown(self.recorder, Picture(self._resolved.arm, self._resolved.scenario))
 
     def at_ns(self) -> int:
         """Return the session's time."""

@@ -26,13 +26,14 @@ class ToldTicks:
 
     Args:
         writes: takes measurement, command and verdict of each.
+        is_sure: ticks will come, as of every arm on a wire: nothing is taken in their place.
 
     Attributes:
         n: Ticks so far.
     """
 
-    def __init__(self, writes: WritesBytes) -> None:
-        self._now_ns = 0
+    def __init__(self, writes: WritesBytes, *, is_sure: bool = False) -> None:
+        self._now_ns, self._is_sure = 0, is_sure
         self._ticks = RecordedTicks(writes, now_ns=lambda: self._now_ns)
         self._before_ns = dict.fromkeys(THINNED, -1)
         """Stamp of the newest that was recorded in a tick's place, by its topic."""
@@ -85,7 +86,7 @@ class ToldTicks:
         """
         if topic.name not in self._before_ns:
             return topic
-        if self.n:
+        if self.n or self._is_sure:
             return msgspec.structs.replace(topic, name=f"bus/{topic.name}")
         self._before_ns[topic.name] = max(self._before_ns[topic.name], getattr(message, "stamp_ns", -1))
         return topic

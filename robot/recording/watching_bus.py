@@ -41,7 +41,8 @@ def record_bus(
     with Bus(endpoint, serial=serial, role=Role.RECORDER, keys=resolved.rig.keys) as bus, StopRequest() as stop:
         recording = Recording(path, resolved, purpose=Purpose.WATCH, seed=0, person=person, tell=tell)
         try:
-            listener = BusListener(bus, recording.recorder, [topic for topic in TOPICS if topic.is_recorded])
+            topics = [topic for topic in TOPICS if topic.is_recorded]
+            listener = BusListener(bus, recording.recorder, topics, is_on_a_wire=True)
             end_s = monotonic() + seconds if seconds else None
             listener.run(lambda: stop() or (end_s is not None and monotonic() >= end_s))
         finally:

@@ -83,6 +83,7 @@ def test_what_is_told_besides_the_ticks_has_a_name_of_its_own_once_they_come(rec
     for topic in (ARM_STATE, REQUESTED, SENT, VERDICT):
         assert told.named(topic, idle).name == f"bus/{topic.name}"
     assert told.named(PERCEPT, idle) is PERCEPT
+    assert ToldTicks(recorder, is_sure=True).named(ARM_STATE, idle).name == "bus/arm/state"
 
 
 def test_a_measurement_that_came_thinned_first_is_not_recorded_again(recorder, tmp_path):
