@@ -184,11 +184,23 @@ def view(
     *,
     begin: Annotated[float, typer.Option("--from", min=0.0, help="Seconds of the session's time.")] = 0.0,
     end: Annotated[float | None, typer.Option("--to", help="Seconds; up to its end if left out.")] = None,
+    video: Annotated[
+        Path | None,
+        typer.Option(help="Write a video there (.mp4) in place of a picture: its camera's frames, or drawn anew."),
+    ] = None,
 ) -> None:
-    """Draw joints and commands, the tool, distances, verdicts and decisions over the session's time."""
-    from robot.recording.view import save_view  # brings matplotlib
+    """Draw joints and commands, tool, distances, percepts, verdicts and decisions over the session's time, or film it.
 
+    A video is of a minute, where no end is given.
+    """
     with SessionFile(session) as opened:
+        if video is not None:
+            from robot.recording.film import save_film  # brings OpenCV
+
+            typer.echo(f"{video}: {save_film(opened, video, from_s=begin, to_s=end)}")
+            return
+        from robot.recording.view import save_view  # brings matplotlib
+
         typer.echo(save_view(opened, out or session.with_suffix(".png"), from_s=begin, to_s=end))
 
 

@@ -9,7 +9,7 @@ from robot.errors import RobotConfigError
 from robot.frames import Frame, Picture, picture_of
 from robot.viewer_messages import CompressedImage, stamp_of
 
-__all__ = ["ImageCoder", "decode_image", "image_coder"]
+__all__ = ["ImageCoder", "decode_image", "image_coder", "opencv"]
 
 NONE = "none"
 
@@ -26,7 +26,7 @@ class ImageCoder:
     """
 
     def __init__(self, form: str, *, quality: int) -> None:
-        self._cv2, self._form = _opencv(), form
+        self._cv2, self._form = opencv(), form
         kinds = {"jpeg": (".jpg", [self._cv2.IMWRITE_JPEG_QUALITY, quality]), "png": (".png", [])}
         if form not in kinds:
             raise RobotConfigError(f"recorded frames: expected {' or '.join(kinds)}, came {form!r}")
@@ -49,12 +49,17 @@ def image_coder(camera: RigCamera | None) -> ImageCoder | None:
 
 def decode_image(image: CompressedImage) -> Picture | None:
     """Return a recorded picture; None where its bytes are none.  -> (height, width, 3) uint8"""
-    cv2 = _opencv()
+    cv2 = opencv()
     found = cv2.imdecode(np.frombuffer(image.data, np.uint8), cv2.IMREAD_COLOR) if image.data else None
     return None if found is None else np.ascontiguousarray(found[:, :, ::-1])
 
 
-def _opencv() -> ModuleType:
+def opencv() -> ModuleType:
+    """Return the module, with one thread: what runs here shares its processors with a control loop.
+
+    Raises:
+        RobotConfigError: it is not installed.
+    """
     try:
         import cv2
     except ImportError as error:
@@ -62,5 +67,5 @@ def _opencv() -> ModuleType:
             f"recorded frames: expected OpenCV, which compresses them, came: {error}. Install the extra that brings "
             "it: pip install 'autotelic[lab]'; or set `recorded: none` for the rig's camera"
         ) from error
-    cv2.setNumThreads(1)  # what runs here shares its processors with a control loop
+    cv2.setNumThreads(1)
     return cv2

@@ -33,12 +33,14 @@ from robot.station import Station
 from robot.teleop.driver import DrivenStation
 from robot.tick_ring import TickReader
 
-__all__ = ["CONFIG", "FORMAT", "STATE", "STOPPED", "UNNAMED", "Recording"]
+__all__ = ["CONFIG", "FORMAT", "STATE", "STOPPED", "STOPS", "UNNAMED", "Recording"]
 
 FORMAT = "1"
 CONFIG, MODEL, VERSIONS, STATE = "config.yaml", "arm.xml", "versions.json", "learner_state.zip"
 """Names of attachments. A learner's state is there where a run was gone on with."""
 UNNAMED = "unnamed"
+STOPS = "stops"
+"""Folder of what led to stops."""
 STOPPED = "stop"
 """Key of a stop's file's metadata: why the arm was stopped."""
 
@@ -187,12 +189,12 @@ class Recording:
         recorder.prepare(RECORDED)
 
     def _begin_stop(self, why: str, at_ns: int) -> Recorder:
-        """Begin a file of what led to a stop, beside this one."""
-        n = 1
-        while (path := self.path.with_name(f"{self.path.stem}.stop-{n:03d}.mcap")).exists():
+        """Begin a file of what led to a stop, in a folder beside this one's: nobody takes it for a session."""
+        n, folder = 1, self.path.parent / STOPS
+        while (path := folder / f"{self.path.stem}-{n:03d}.mcap").exists():
             n += 1
         recorder = Recorder(Sink(path, may_wait=True), lanes=LANES, tell=self._tell)
-        self._head(recorder, {STOPPED: why, "stop_ns": str(at_ns)})
+        self._head(recorder, {"purpose": Purpose.WATCH.value, STOPPED: why, "stop_ns": str(at_ns)})
         self._tell(f"the arm was stopped ({why}): what led to it is in {path}")
         return recorder
 

@@ -68,7 +68,7 @@ def stopped(tmp_path_factory):
     finally:
         process.send_signal(signal.SIGINT)
         process.communicate(timeout=120)
-    return sorted((folder / "up/sessions").glob("*.stop-*.mcap")), said_ns, killed_ns
+    return sorted((folder / "up/sessions").glob("stops/*.mcap")), said_ns, killed_ns
 
 
 def of_the_stop(paths, at_ns, within_s):
