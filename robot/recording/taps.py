@@ -23,10 +23,10 @@ from robot.messages import (
     Verdict,
 )
 from robot.recording.images import ImageCoder
-from robot.recording.messages import Asked, Event, Purpose, ResetMark, StationMark, StepMark
+from robot.recording.messages import Asked, EpisodeMark, Event, Purpose, ResetMark, StationMark, StepMark
 from robot.recording.picture import Picture
 from robot.recording.recorder import Recorder
-from robot.recording.topics import EVENT, INTENT, RESET_MARK, SCENE, STATION, STEP, TF
+from robot.recording.topics import EPISODE, EVENT, INTENT, RESET_MARK, SCENE, STATION, STEP, TF
 from robot.station import Station
 from robot.teleop.driver import DrivenStation
 
@@ -256,6 +256,10 @@ class RecordedDrive(RecordedStation):
             more_ticks=more_ticks,
         )  # fmt: skip
         self._driven = station
+
+    def mark(self, mark: EpisodeMark) -> None:
+        """Record where an episode begins or ends."""
+        self._recorder.write(EPISODE, mark, log_ns=self._time())
 
     @property
     def measured(self) -> ArmState:
