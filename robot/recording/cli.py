@@ -20,11 +20,17 @@ from robot.recording.session_file import SessionFile
 from robot.recording.telling import about_session
 from robot.rigs import load
 from robot.stdio import STDERR, redirected_stdout
+from robot.stop_request import StopRequest
 
 __all__ = ["app"]
 
 EXIT_FAILED = 1
-REPLAYERS = {"learning": "learning.replaying:replay_session", "twin": "robot.recording.replay_to_arm:replay_to_arm"}
+REPLAYERS = {
+    "learning": "learning.replaying:replay_session",
+    "twin": "robot.recording.replay_to_arm:replay_to_arm",
+    "arm": "robot.recording.replay_to_wire:replay_to_wire",
+    "bus": "robot.recording.replay_to_bus:replay_to_bus",
+}
 """Who replays a session; learning is not known here."""
 EXPORTERS = {
     "lerobot": "robot.recording.exporting.lerobot:export_lerobot",
@@ -208,20 +214,32 @@ def view(
 def replay(
     session: Session,
     *,
-    to: Annotated[str, typer.Option(help="learning, or twin.")] = "learning",
+    to: Annotated[str, typer.Option(help="learning, twin, arm (a virtual one on a wire), or bus.")] = "learning",
     rig: Annotated[
-        str | None, typer.Option(help="For twin: a shipped rig or a file; the session's own if left out.")
+        str | None, typer.Option(help="For twin and arm: a shipped rig or a file; the session's own if left out.")
     ] = None,
+    bus: Annotated[str, typer.Option(help="For bus: where it is opened, on this machine.")] = "tcp/127.0.0.1:7457",
+    rate: Annotated[float, typer.Option(min=0.01, max=100.0, help="For bus: so many times as fast.")] = 1.0,
+    begin: Annotated[float, typer.Option("--from", min=0.0, help="For bus: seconds since its beginning.")] = 0.0,
+    end: Annotated[float | None, typer.Option("--until", help="For bus: the same; its end if left out.")] = None,
     json: Json = False,
 ) -> None:
-    """Let the learner, or the twin, live through a session again; exit code 1 if it does not come to the same."""
+    """Let the learner, the twin or an arm live through a session again, or a bus tell it as if it were live.
+
+    Exit code 1 if it does not come to the same; over a wire, if not all was carried out.
+    """
     if to not in REPLAYERS:
         raise typer.BadParameter(f"expected {' or '.join(REPLAYERS)}, got {to!r}", param_hint="--to")
-    if to != "twin" and rig is not None:
-        raise typer.BadParameter("expected --to twin beside it", param_hint="--rig")
+    if to not in ("twin", "arm") and rig is not None:
+        raise typer.BadParameter("expected --to twin or arm beside it", param_hint="--rig")
     with redirected_stdout(STDERR):
         replayer = load(REPLAYERS[to])
-        done = replayer(session) if rig is None else replayer(session, rig=rig)
+        if to == "bus":
+            until_s = float("inf") if end is None else end
+            with StopRequest() as stop:
+                done = replayer(session, endpoint=bus, rate=rate, from_s=begin, to_s=until_s, should_stop=stop)
+        else:
+            done = replayer(session) if rig is None else replayer(session, rig=rig)
     if json:
         typer.echo(msgspec.json.encode(done.told()).decode())
     else:
