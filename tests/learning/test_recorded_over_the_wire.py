@@ -27,7 +27,7 @@ def test_a_run_over_the_wire_is_recorded_and_replayed_to_the_same_learner(tmp_pa
         replayed = json.loads(told)
         assert (code, replayed["is_same"]) == (0, True), said
         assert replayed["n_steps"] > 10
-        assert replayed["joint_error_rad"] < 0.1
+        assert replayed["joint_error_rad"] < 0.1, told
     (path,) = (tmp_path / "run").glob("*.mcap")
     with SessionFile(path) as session:
         about = session.about
