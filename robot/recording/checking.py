@@ -22,8 +22,8 @@ GAP = 3.0
 """Times the usual distance between two messages."""
 LATE_NS = 20_000_000
 """Ticks of 2 ms that came no later than this were late, and nothing was lost."""
-BEFORE_NS = 250_000_000
-"""So long an arm may go on ticking after somebody began to lay its table out."""
+BEFORE_NS = 1_000_000_000
+"""So long an arm on a wire may go on ticking after somebody began to lay its table out."""
 FROZEN_N = 50
 """So many measurements in a row that are the same to the last bit: no sensor is that quiet while something moves."""
 N_SAME_FRAMES = 5
@@ -114,7 +114,8 @@ def check(session: SessionFile) -> Checked:
         by_topic: dict[str, list[Raw]] = {}
         for raw in session.raw():
             by_topic.setdefault(session.topic_of(raw.channel), []).append(raw)
-        excused = [raw.log_ns for topic in EXCUSES for raw in by_topic.get(topic, [])]
+        lasts_ns = BEFORE_NS if session.about.get("clock") == "host" else 0
+        excused = [(raw.log_ns, raw.log_ns + lasts_ns) for topic in EXCUSES for raw in by_topic.get(topic, [])]
         for topic, raws in sorted(by_topic.items()):
             streams.append(_stream(topic, raws))
             _look_at_times(topic, raws, excused, found)
@@ -156,7 +157,7 @@ def _stream(topic: str, raws: list[Raw]) -> Stream:
     return Stream(topic=topic, n=len(raws), first_s=raws[0].log_ns / 1e9, last_s=raws[-1].log_ns / 1e9, usual_s=usual)
 
 
-def _look_at_times(topic: str, raws: list[Raw], excused: list[int], found: _Findings) -> None:
+def _look_at_times(topic: str, raws: list[Raw], excused: list[tuple[int, int]], found: _Findings) -> None:
     """Stamps that go back, come twice, drift or are missing; messages lost on their way into the file."""
     sequence: dict[int, int] = {}
     for raw in raws:
@@ -173,13 +174,15 @@ def _look_at_times(topic: str, raws: list[Raw], excused: list[int], found: _Find
         _look_at_rate(topic, raws, excused, found)
 
 
-def _look_at_rate(topic: str, raws: list[Raw], excused: list[int], found: _Findings) -> None:
+def _look_at_rate(topic: str, raws: list[Raw], excused: list[tuple[int, int]], found: _Findings) -> None:
     """Gaps, duplicates and drift of a stream that should be steady; resets and stops take their own time, or none."""
     distances = sorted(b.publish_ns - a.publish_ns for a, b in itertools.pairwise(raws))
     usual = distances[len(distances) // 2] if distances else 0
     for a, b in itertools.pairwise(raws):
         far = b.publish_ns - a.publish_ns
-        is_excused = (far == 0 or far > GAP * usual) and any(a.log_ns - BEFORE_NS <= at <= b.log_ns for at in excused)
+        is_excused = (far == 0 or far > GAP * usual) and any(
+            begin <= b.log_ns and a.log_ns <= end for begin, end in excused
+        )
         if is_excused:
             continue
         if far == 0 and a.payload == b.payload:

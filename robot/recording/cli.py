@@ -37,6 +37,7 @@ EXPORTERS = {
     "minari": "robot.recording.exporting.minari_set:export_minari",
 }
 """Loaded when asked for: they bring libraries of their own."""
+VIEWER = "viewer"
 MOST_LOST = 10
 
 app = typer.Typer(
@@ -97,13 +98,22 @@ def check(session: Session, *, json: Json = False) -> None:
 @app.command()
 def export(
     sessions: Annotated[list[Path], typer.Argument(help="Sessions' files, into one data set.")],
-    out: Annotated[Path, typer.Option("--out", "-o", help="Its folder; nothing is overwritten.")],
+    out: Annotated[Path, typer.Option("--out", "-o", help="Its folder, or its file; nothing is overwritten.")],
     *,
-    to: Annotated[str, typer.Option(help="lerobot (LeRobotDataset v3.0) or minari.")] = "lerobot",
+    to: Annotated[
+        str,
+        typer.Option(help="lerobot (LeRobotDataset v3.0), minari, or viewer (one MCAP file with Protocol Buffers)."),
+    ] = "lerobot",
 ) -> None:
-    """Write sessions as a data set that others' learners read: `pip install autotelic[export]`."""
+    """Write sessions as a data set that others' learners read (`pip install autotelic[export]`), or for a viewer."""
+    if to == VIEWER and len(sessions) == 1:
+        from robot.recording.viewer_file import write_viewer_file
+
+        typer.echo(f"{out}: {write_viewer_file(sessions[0], out)}")
+        return
     if to not in EXPORTERS:
-        raise typer.BadParameter(f"expected {' or '.join(EXPORTERS)}, came {to!r}", param_hint="--to")
+        names = " or ".join([*EXPORTERS, f"{VIEWER}, of one session"])
+        raise typer.BadParameter(f"expected {names}, came {to!r}", param_hint="--to")
     from robot.recording.exporting import courses_of
 
     try:

@@ -134,7 +134,7 @@ class Recording:
         heard.begin(is_driven=True)
         return heard
 
-    def _tick_source(self, ticks: TickReader | None) -> Callable[[], bool] | None:
+    def _tick_source(self, ticks: TickReader | None) -> Callable[[], object] | None:
         """Return what records the ticks of an arm that is held by this process's own servo process."""
         if ticks is not None and self._now_ns is not None and self._taken is None:
             self._taken = TakenTicks(ticks, self.recorder)

@@ -136,8 +136,7 @@ class RecordedStation:
         heard: takes percepts and outcomes into a digest.
         measure: returns the newest measurement, where ticks are not heard here: it is recorded with every step, and so
             is the command that was sent last.
-        more_ticks: records all ticks since it was called last and tells whether there were any: then nothing else of
-            the arm is recorded with a step.
+        more_ticks: records all ticks since it was called last: then nothing else of the arm is recorded with a step.
     """
 
     def __init__(
@@ -151,7 +150,7 @@ class RecordedStation:
         now_ns: Now | None = None,
         heard: Heard | None = None,
         measure: Callable[[], ArmState] | None = None,
-        more_ticks: Callable[[], bool] | None = None,
+        more_ticks: Callable[[], object] | None = None,
     ) -> None:
         self._measure, self._more_ticks = measure, more_ticks
         self._heard: Heard = heard or sha256()
@@ -214,8 +213,10 @@ class RecordedStation:
         state = None if self._ticks is None else self._ticks.state
         if self._measure is not None:
             state = self._measure()
-            if self._more_ticks is None or not self._more_ticks():
+            if self._more_ticks is None:
                 self._recorder.write(ARM_STATE, state, log_ns=at, stamp_ns=state.stamp_ns)
+            else:
+                self._more_ticks()
         if self._picture is None:
             return
         frames = self._picture.frames(state, percept)
@@ -249,7 +250,7 @@ class RecordedDrive(RecordedStation):
         picture: Picture,
         now_ns: Now | None,
         measure: Callable[[], ArmState] | None,
-        more_ticks: Callable[[], bool] | None = None,
+        more_ticks: Callable[[], object] | None = None,
     ) -> None:
         super().__init__(
             station, recorder, purpose=Purpose.DRIVE, ticks=ticks, picture=picture, now_ns=now_ns, measure=measure,

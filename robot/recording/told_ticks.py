@@ -104,9 +104,7 @@ class TakenTicks:
         self._reader, self._told = reader, ToldTicks(writes)
         reader.take()  # what was before the recording
 
-    def __call__(self) -> bool:
-        """Record what has come, and return whether it holds a measurement."""
-        ticks = [decode_tick(raw) for raw in self._reader.take()]
-        for tick in ticks:
-            self._told.take(tick)
-        return any(tick.state is not None for tick in ticks)
+    def __call__(self) -> None:
+        """Record what has come."""
+        for raw in self._reader.take():
+            self._told.take(decode_tick(raw))
