@@ -4,6 +4,7 @@ Errors make a session unfit to learn from or to replay; warnings are worth a loo
 """
 
 import itertools
+from bisect import bisect_right
 from collections.abc import Iterator
 from enum import StrEnum
 
@@ -18,6 +19,9 @@ from robot.recording.topics import EPOCH, EVENT, GOAL, INTENT, RECORDED, RESET_M
 
 __all__ = ["Checked", "Finding", "Severity", "Stream", "check", "lines"]
 
+PAUSE_NS = 500_000_000
+Excused = tuple[list[tuple[int, int]], list[tuple[int, int]]]
+"""Spans that a gap may touch, and those that it may lie in."""
 GAP = 3.0
 """Times the usual distance between two messages."""
 LATE_NS = 20_000_000
@@ -116,9 +120,10 @@ def check(session: SessionFile) -> Checked:
             by_topic.setdefault(session.topic_of(raw.channel), []).append(raw)
         lasts_ns = BEFORE_NS if session.about.get("clock") == "host" else 0
         excused = [(raw.log_ns, raw.log_ns + lasts_ns) for topic in EXCUSES for raw in by_topic.get(topic, [])]
+        pauses = _pauses(by_topic.get(STEP.name, []), by_topic.get(INTENT.name, [])) if lasts_ns else []
         for topic, raws in sorted(by_topic.items()):
             streams.append(_stream(topic, raws))
-            _look_at_times(topic, raws, excused, found)
+            _look_at_times(topic, raws, (excused, pauses), found)
         if STOPPED not in session.about:  # a stop's file begins and ends within an epoch
             _look_at_epochs(session, found)
         _look_at_events(session, found)
@@ -157,7 +162,7 @@ def _stream(topic: str, raws: list[Raw]) -> Stream:
     return Stream(topic=topic, n=len(raws), first_s=raws[0].log_ns / 1e9, last_s=raws[-1].log_ns / 1e9, usual_s=usual)
 
 
-def _look_at_times(topic: str, raws: list[Raw], excused: list[tuple[int, int]], found: _Findings) -> None:
+def _look_at_times(topic: str, raws: list[Raw], excused: Excused, found: _Findings) -> None:
     """Stamps that go back, come twice, drift or are missing; messages lost on their way into the file."""
     sequence: dict[int, int] = {}
     for raw in raws:
@@ -174,16 +179,33 @@ def _look_at_times(topic: str, raws: list[Raw], excused: list[tuple[int, int]], 
         _look_at_rate(topic, raws, excused, found)
 
 
-def _look_at_rate(topic: str, raws: list[Raw], excused: list[tuple[int, int]], found: _Findings) -> None:
+def _is_excused(begin_ns: int, end_ns: int, excused: Excused) -> bool:
+    touched, around = excused
+    return any(begin <= end_ns and begin_ns <= end for begin, end in touched) or any(
+        begin <= begin_ns + LATE_NS and end_ns <= end + LATE_NS for begin, end in around
+    )
+
+
+def _pauses(steps: list[Raw], intents: list[Raw]) -> list[tuple[int, int]]:
+    """Return the spans in which nobody asked anything of an arm on a wire: while it is armed again it does not tick."""
+    asked_ns = [raw.log_ns for raw in intents]
+    found: list[tuple[int, int]] = []
+    for raw in steps:
+        n = bisect_right(asked_ns, raw.log_ns)
+        until_ns = asked_ns[n] if n < len(asked_ns) else raw.log_ns
+        if until_ns - raw.log_ns > PAUSE_NS:
+            found.append((raw.log_ns, until_ns))
+    return found
+
+
+def _look_at_rate(topic: str, raws: list[Raw], excused: Excused, found: _Findings) -> None:
     """Gaps, duplicates and drift of a stream that should be steady; resets and stops take their own time, or none."""
     distances = sorted(b.publish_ns - a.publish_ns for a, b in itertools.pairwise(raws))
     usual = distances[len(distances) // 2] if distances else 0
     for a, b in itertools.pairwise(raws):
         far = b.publish_ns - a.publish_ns
-        is_excused = (far == 0 or far > GAP * usual) and any(
-            begin <= b.log_ns and a.log_ns <= end for begin, end in excused
-        )
-        if is_excused:
+        is_odd = far == 0 or far > GAP * usual
+        if is_odd and _is_excused(a.log_ns, b.log_ns, excused):
             continue
         if far == 0 and a.payload == b.payload:
             found.add("duplicate", topic, f"the message of {a.publish_ns / 1e9:.6f} s came twice", at_ns=b.log_ns)
