@@ -56,7 +56,8 @@ class BusRecorder:
         self._files, self._order = files, AccountOrder()
         self._is_told, self._is_open = False, False
         self._recording: Recording = files.watch()
-        self._ticks = ToldTicks(self._recording.recorder, is_sure=self._recording.is_on_a_wire)
+        first = self._recording
+        self._ticks = ToldTicks(first.wire_ticks, is_sure=first.is_on_a_wire, is_aside=first.are_ticks_aside)
         self._shown = self._recording.shown()
         self._measured: ArmState | None = None
         self._came: Queue[Came] = Queue(MOST_WAITING)
@@ -192,5 +193,5 @@ class BusRecorder:
             return
         self._recording.close()
         self._recording, self._is_told = begun, True
-        self._ticks.go_on(begun.recorder)
+        self._ticks.go_on(begun.wire_ticks)
         self._shown = begun.shown()

@@ -9,13 +9,16 @@ from queue import SimpleQueue
 from threading import Thread
 from typing import Any, NamedTuple
 
+import msgspec
+
+from robot.bus.codec import Codec
 from robot.bus.topic import Topic
 from robot.errors import RobotError
 from robot.recording.recorder import Recorder
 from robot.recording.stops import StopsHeard
 from robot.recording.topics import GOAL, RESET_MARK, SCENE, STATION, SUBGOAL
 
-__all__ = ["AFTER_NS", "BEFORE_NS", "MOST_FILES", "Begin", "Flight"]
+__all__ = ["AFTER_NS", "BEFORE_NS", "MOST_FILES", "Begin", "Flight", "FlightTicks"]
 
 BEFORE_NS, AFTER_NS = 30_000_000_000, 2_000_000_000
 MOST_BYTES = 1 << 28
@@ -124,6 +127,38 @@ class Flight:
         while (kept := more.get()) is not None:
             _put(recorder, kept)
         recorder.close()
+
+
+class FlightTicks:
+    """Takes ticks for a flight recorder alone (robot.recording.taps.WritesBytes): a session has them thinned.
+
+    Args:
+        flight: keeps them.
+    """
+
+    def __init__(self, flight: Flight) -> None:
+        self._flight = flight
+        self._codecs: dict[type, Codec[Any]] = {}
+        self._encode = msgspec.json.Encoder().encode
+
+    def encoded(self, message: msgspec.Struct) -> bytes:
+        """Return the payload of a message whose numbers are finite."""
+        return self._encode(message)
+
+    def write(self, topic: Topic[Any], message: msgspec.Struct, *, log_ns: int, stamp_ns: int | None = None) -> bytes:
+        """Take a message, and return its payload."""
+        codec = self._codecs.get(topic.kind)
+        if codec is None:
+            codec = self._codecs[topic.kind] = Codec(topic.kind)
+        payload, _, has_words = codec.encode(message)
+        stamp_ns = log_ns if stamp_ns is None else stamp_ns
+        self.put(topic, payload, log_ns=log_ns, stamp_ns=stamp_ns, has_words=has_words)
+        self._flight.look(message, log_ns=log_ns)
+        return payload
+
+    def put(self, topic: Topic[Any], payload: bytes, *, log_ns: int, stamp_ns: int, has_words: bool = False) -> None:
+        """Take one as its bytes."""
+        self._flight.heard(topic, payload, log_ns=log_ns, stamp_ns=stamp_ns, has_words=has_words)
 
 
 def _put(recorder: Recorder, kept: _Kept) -> None:

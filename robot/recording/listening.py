@@ -28,16 +28,16 @@ class BusListener:
         bus: open.
         recorder: takes it.
         topics: what is listened to.
-        is_on_a_wire: the arm is held by a process that tells every tick.
+        ticks: takes every tick of an arm on a wire; they go into the recorder if left out.
 
     Attributes:
         n: Messages recorded.
     """
 
     def __init__(
-        self, bus: Bus, recorder: Recorder, topics: Iterable[Topic[Any]], *, is_on_a_wire: bool = False
+        self, bus: Bus, recorder: Recorder, topics: Iterable[Topic[Any]], *, ticks: ToldTicks | None = None
     ) -> None:
-        self._recorder, self._ticks = recorder, ToldTicks(recorder, is_sure=is_on_a_wire)
+        self._recorder, self._ticks = recorder, ticks or ToldTicks(recorder)
         self._came: SimpleQueue[Came] = SimpleQueue()
         self._newest_ns = self.n = 0
         self._subscribers = [bus.subscriber(topic, partial(self._take, as_on_the_bus(topic))) for topic in topics]

@@ -3,7 +3,7 @@
 Topics of a kind share chunks (`Lane`), so that who needs decisions alone need not unpack what came every tick.
 """
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from typing import Any, Protocol
 
 import msgspec
@@ -50,6 +50,7 @@ class Recorder:
         tell: is told once in words when something is lost.
         lanes: which topics share chunks, by a topic's name; DECISIONS where it is not named.
         keeps: hears of every message, too.
+        unkept: names of topics whose messages it is not told: it hears of them elsewhere.
 
     Attributes:
         n_lost: Messages that the disk was too slow for, or gone.
@@ -57,8 +58,9 @@ class Recorder:
 
     def __init__(
         self, sink: Sink, *, lanes: Mapping[str, Lane], tell: Callable[[str], object] = lambda _: None,
-        keeps: "Keeps | None" = None,
+        keeps: "Keeps | None" = None, unkept: Collection[str] = (),
     ) -> None:  # fmt: skip
+        self._unkept = frozenset(unkept)
         self._sink, self._tell, self._lane_of, self._keeps = sink, tell, lanes, keeps
         self._chunks = Chunks(self._hand_over)
         self._channels: dict[tuple[str, bool], _Channel] = {}
@@ -107,7 +109,7 @@ class Recorder:
         channel = self._channels.get((topic.name, has_words)) or self._open(topic, has_words=has_words)
         self._chunks.add(channel.lane, channel.number, channel.n, log_ns, stamp_ns, payload)
         channel.n += 1
-        if self._keeps is not None:
+        if self._keeps is not None and topic.name not in self._unkept:
             self._keeps.heard(topic, payload, log_ns=log_ns, stamp_ns=stamp_ns, has_words=has_words)
 
     def flush(self, when_written: Callable[[], object] | None = None) -> None:

@@ -18,15 +18,15 @@ from config.resolved import Resolved, dump_resolved
 from robot.bench import bench_report
 from robot.description import write_mjcf
 from robot.messages import ArmState
-from robot.recording.flight import Flight
+from robot.recording.flight import Flight, FlightTicks
 from robot.recording.images import image_coder
 from robot.recording.messages import Purpose
 from robot.recording.picture import Picture
 from robot.recording.recorder import Recorder
 from robot.recording.shown import Shown
 from robot.recording.sink import Sink
-from robot.recording.taps import RecordedDrive, RecordedStation, RecordedTicks
-from robot.recording.told_ticks import TakenTicks
+from robot.recording.taps import RecordedDrive, RecordedStation, RecordedTicks, WritesBytes
+from robot.recording.told_ticks import THINNED, TakenTicks
 from robot.recording.topics import LANES, RECORDED
 from robot.revision import git_revision
 from robot.station import Station
@@ -39,6 +39,7 @@ FORMAT = "1"
 CONFIG, MODEL, VERSIONS, STATE = "config.yaml", "arm.xml", "versions.json", "learner_state.zip"
 """Names of attachments. A learner's state is there where a run was gone on with."""
 UNNAMED = "unnamed"
+WHOLE = "whole"
 STOPS = "stops"
 """Folder of what led to stops."""
 STOPPED = "stop"
@@ -63,6 +64,7 @@ class Recording:
         recorder: Takes more.
         ticks: Listens to a tick loop in this process.
         heard: Digest of the percepts and outcomes of epochs that are for what the recording is for.
+        wire_ticks: Takes every tick of an arm on a wire: into the session, or where only stops need them.
     """
 
     def __init__(
@@ -84,7 +86,13 @@ class Recording:
         self.path, self._tell = path, tell
         self._own_flight = Flight(tell=tell) if flight is None else None
         flight = self._own_flight or flight
-        self.recorder = Recorder(Sink(path, may_wait=is_lock_step), lanes=LANES, tell=tell, keeps=flight)
+        is_whole = is_lock_step or resolved.rig.recorded_ticks == WHOLE
+        unkept = () if is_whole else THINNED
+        self.recorder = Recorder(
+            Sink(path, may_wait=is_lock_step), lanes=LANES, tell=tell, keeps=flight, unkept=unkept
+        )  # fmt: skip
+        assert flight is not None, "one is made where none is given"
+        self.wire_ticks: WritesBytes = self.recorder if is_whole else FlightTicks(flight)
         images = image_coder(resolved.rig.camera)
         self.ticks = RecordedTicks(self.recorder, now_ns=self._now_ns, images=images)
         self._said = self._about(seed, person) | dict(about or {})
@@ -92,8 +100,7 @@ class Recording:
         self._head(self.recorder, {})
         for name, content in (attached or {}).items():
             self.recorder.attach(name, "application/octet-stream", content)
-        if flight is not None:
-            flight.follow(self._begin_stop)
+        flight.follow(self._begin_stop)
         self._taken: TakenTicks | None = None
         self._is_begun = False
         self.heard = sha256()
@@ -134,11 +141,16 @@ class Recording:
         heard.begin(is_driven=True)
         return heard
 
-    def _tick_source(self, ticks: TickReader | None) -> Callable[[], object] | None:
+    def _tick_source(self, ticks: TickReader | None) -> Callable[[], bool] | None:
         """Return what records the ticks of an arm that is held by this process's own servo process."""
         if ticks is not None and self._now_ns is not None and self._taken is None:
-            self._taken = TakenTicks(ticks, self.recorder)
+            self._taken = TakenTicks(ticks, self.wire_ticks, is_aside=self.are_ticks_aside)
         return None if ticks is None else self._taken
+
+    @property
+    def are_ticks_aside(self) -> bool:
+        """Whether the session has an arm's ticks thinned, and every one only around a stop."""
+        return self.wire_ticks is not self.recorder
 
     @property
     def is_on_a_wire(self) -> bool:

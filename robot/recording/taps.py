@@ -136,7 +136,7 @@ class RecordedStation:
         heard: takes percepts and outcomes into a digest.
         measure: returns the newest measurement, where ticks are not heard here: it is recorded with every step, and so
             is the command that was sent last.
-        more_ticks: records all ticks since it was called last: then nothing else of the arm is recorded with a step.
+        more_ticks: records all ticks since it was called last, and tells whether nothing else of the arm need be.
     """
 
     def __init__(
@@ -150,7 +150,7 @@ class RecordedStation:
         now_ns: Now | None = None,
         heard: Heard | None = None,
         measure: Callable[[], ArmState] | None = None,
-        more_ticks: Callable[[], object] | None = None,
+        more_ticks: Callable[[], bool] | None = None,
     ) -> None:
         self._measure, self._more_ticks = measure, more_ticks
         self._heard: Heard = heard or sha256()
@@ -194,7 +194,8 @@ class RecordedStation:
             self._happened("step failed", str(error))
             raise
         self._perceived(result.percept)
-        if self._measure is not None and self._more_ticks is None and result.executed.sent is not None:
+        is_needed = self._measure is not None and (self._more_ticks is None or not self._more_ticks())
+        if is_needed and result.executed.sent is not None:
             self._recorder.write(SENT, result.executed.sent, log_ns=self._at_ns, stamp_ns=result.executed.sent.stamp_ns)
         mark = StepMark(executed=result.executed, verdicts=result.verdicts, is_void=result.is_void)
         self._heard.update(self._recorder.write(STEP, mark, log_ns=self._at_ns))
@@ -213,10 +214,8 @@ class RecordedStation:
         state = None if self._ticks is None else self._ticks.state
         if self._measure is not None:
             state = self._measure()
-            if self._more_ticks is None:
+            if self._more_ticks is None or not self._more_ticks():
                 self._recorder.write(ARM_STATE, state, log_ns=at, stamp_ns=state.stamp_ns)
-            else:
-                self._more_ticks()
         if self._picture is None:
             return
         frames = self._picture.frames(state, percept)
@@ -250,7 +249,7 @@ class RecordedDrive(RecordedStation):
         picture: Picture,
         now_ns: Now | None,
         measure: Callable[[], ArmState] | None,
-        more_ticks: Callable[[], object] | None = None,
+        more_ticks: Callable[[], bool] | None = None,
     ) -> None:
         super().__init__(
             station, recorder, purpose=Purpose.DRIVE, ticks=ticks, picture=picture, now_ns=now_ns, measure=measure,

@@ -16,9 +16,9 @@ from robot.messages import ArmState
 from robot.recording.taps import RecordedTicks, WritesBytes
 from robot.tick_ring import Tick, TickReader, decode_tick
 
-__all__ = ["TakenTicks", "ToldTicks"]
+__all__ = ["THINNED", "TakenTicks", "ToldTicks"]
 
-THINNED = (ARM_STATE.name, REQUESTED.name, SENT.name, VERDICT.name)
+THINNED: tuple[str, ...] = (ARM_STATE.name, REQUESTED.name, SENT.name, VERDICT.name)
 
 
 class ToldTicks:
@@ -27,13 +27,14 @@ class ToldTicks:
     Args:
         writes: takes measurement, command and verdict of each.
         is_sure: ticks will come, as of every arm on a wire: nothing is taken in their place.
+        is_aside: they are recorded elsewhere: what is thinned is what the session has.
 
     Attributes:
         n: Ticks so far.
     """
 
-    def __init__(self, writes: WritesBytes, *, is_sure: bool = False) -> None:
-        self._now_ns, self._is_sure = 0, is_sure
+    def __init__(self, writes: WritesBytes, *, is_sure: bool = False, is_aside: bool = False) -> None:
+        self._now_ns, self._is_sure, self._is_aside = 0, is_sure, is_aside
         self._ticks = RecordedTicks(writes, now_ns=lambda: self._now_ns)
         self._before_ns = dict.fromkeys(THINNED, -1)
         """Stamp of the newest that was recorded in a tick's place, by its topic."""
@@ -84,7 +85,7 @@ class ToldTicks:
             topic: as sessions have it.
             message: the same.
         """
-        if topic.name not in self._before_ns:
+        if topic.name not in self._before_ns or self._is_aside:
             return topic
         if self.n or self._is_sure:
             return msgspec.structs.replace(topic, name=f"bus/{topic.name}")
@@ -98,13 +99,15 @@ class TakenTicks:
     Args:
         reader: of its ticks.
         writes: takes them; the session's clock is this machine's.
+        is_aside: they are recorded elsewhere, and the session needs its own.
     """
 
-    def __init__(self, reader: TickReader, writes: WritesBytes) -> None:
-        self._reader, self._told = reader, ToldTicks(writes)
+    def __init__(self, reader: TickReader, writes: WritesBytes, *, is_aside: bool = False) -> None:
+        self._reader, self._told, self._is_aside = reader, ToldTicks(writes), is_aside
         reader.take()  # what was before the recording
 
-    def __call__(self) -> None:
-        """Record what has come."""
+    def __call__(self) -> bool:
+        """Record what has come, and return whether that is all that the session needs of the arm."""
         for raw in self._reader.take():
             self._told.take(decode_tick(raw))
+        return not self._is_aside

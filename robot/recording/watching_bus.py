@@ -10,6 +10,7 @@ from robot.recording.errors import UnfitError
 from robot.recording.listening import BusListener
 from robot.recording.messages import Purpose
 from robot.recording.recording import Recording
+from robot.recording.told_ticks import ToldTicks
 from robot.stop_request import StopRequest
 
 __all__ = ["record_bus"]
@@ -42,7 +43,8 @@ def record_bus(
         recording = Recording(path, resolved, purpose=Purpose.WATCH, seed=0, person=person, tell=tell)
         try:
             topics = [topic for topic in TOPICS if topic.is_recorded]
-            listener = BusListener(bus, recording.recorder, topics, is_on_a_wire=True)
+            ticks = ToldTicks(recording.wire_ticks, is_sure=True, is_aside=recording.are_ticks_aside)
+            listener = BusListener(bus, recording.recorder, topics, ticks=ticks)
             end_s = monotonic() + seconds if seconds else None
             listener.run(lambda: stop() or (end_s is not None and monotonic() >= end_s))
         finally:

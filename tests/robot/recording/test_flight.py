@@ -2,21 +2,26 @@
 
 from itertools import pairwise
 
+import msgspec
 import pytest
 from mcap.reader import make_reader
 
+from config.loader import resolve
 from robot.bus.station_rows import StationReport, StopAsk
 from robot.bus.topics import ARM_STATE, STOP, VERDICT
 from robot.messages import Executed, Outcome, StationMode, StationState, Verdict
 from robot.recording.errors import UnfitError
 from robot.recording.flight import AFTER_NS, BEFORE_NS, MOST_FILES, Flight
-from robot.recording.messages import Event, GoalChosen, StepMark
+from robot.recording.messages import Event, GoalChosen, Purpose, StepMark
 from robot.recording.recorder import Recorder
+from robot.recording.recording import Recording
 from robot.recording.session_file import SessionFile
 from robot.recording.sink import Sink
 from robot.recording.stops import StopsHeard
+from robot.recording.told_ticks import ToldTicks
 from robot.recording.topics import GOAL, LANES
-from tests.support.stations import arm_state
+from robot.tick_ring import Tick
+from tests.support.stations import arm_state, command
 
 Q = (0.0, -1.5, 1.5, -1.5, -1.5, 0.0)
 S, TICK_NS = 1_000_000_000, 100_000_000
@@ -179,3 +184,26 @@ def test_a_time_step_whose_verdict_latched_counts_and_one_that_was_merely_void_d
     heard = StopsHeard()
     assert heard.why(StepMark(executed=executed, verdicts=(), is_void=True)) is None
     assert heard.why(StepMark(executed=executed, verdicts=(LATCHED,), is_void=True)) == "speed: too fast"
+
+
+@pytest.mark.parametrize(("recorded", "n_in_session"), [("whole", 200), ("around_stops", 4)])
+def test_a_session_has_every_tick_or_few_and_a_stop_s_file_has_every_one(tmp_path, recorded, n_in_session):
+    """Ticks of 2 ms come over a wire, every fiftieth is told by its robot node besides, and then the arm latches."""
+    then = resolve(rig="virtual_lab", scenario="paper", learning="default")
+    rig = msgspec.structs.replace(then.rig, recorded_ticks=recorded)
+    path = tmp_path / "session.mcap"
+    recording = Recording(path, msgspec.structs.replace(then, rig=rig), purpose=Purpose.WATCH, seed=0)
+    told = ToldTicks(recording.wire_ticks, is_sure=True, is_aside=recording.are_ticks_aside)
+    for k in range(1, 201):
+        at = k * 2_000_000
+        state = arm_state(Q, stamp_ns=at)
+        told.take(Tick(at, at, state, command(Q, stamp_ns=at, sequence=k), (), LATCHED if k == 200 else None))
+        if k % 50 == 0:
+            recording.recorder.write(told.named(ARM_STATE, state), state, log_ns=at, stamp_ns=at)
+    recording.close()
+    (stop,) = (tmp_path / "stops").glob("session-*.mcap")
+    with SessionFile(path) as session, SessionFile(stop) as kept:
+        assert sum(1 for _ in session.raw([ARM_STATE.name])) == n_in_session
+        assert [raw.log_ns // 2_000_000 for raw in kept.raw([ARM_STATE.name])] == list(range(1, 201))
+        assert kept.about["stop"] == "speed: too fast"
+        assert {attached.name for attached in kept.attachments()} >= {"config.yaml", "arm.xml"}
