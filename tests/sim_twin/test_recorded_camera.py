@@ -1,5 +1,6 @@
 """A drive on the rig twin_camera: every frame that perception read is in its session, and films itself."""
 
+import os
 from itertools import pairwise
 from statistics import median
 
@@ -14,7 +15,10 @@ from robot.recording.film import save_film
 from robot.recording.images import decode_image
 from robot.recording.session_file import SessionFile
 
-pytestmark = pytest.mark.slow
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif("MUJOCO_GL" not in os.environ, reason="nothing says how to draw off-screen: MUJOCO_GL=egl"),
+]
 
 
 @pytest.fixture(scope="module")

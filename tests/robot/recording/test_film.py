@@ -1,5 +1,6 @@
 """A film of a session goes by in the session's own time and says what was decided and refused."""
 
+import os
 import shutil
 from pathlib import Path
 
@@ -86,6 +87,9 @@ def test_where_no_video_can_be_written_that_is_said(tmp_path):
 
 
 @pytest.mark.slow
+@pytest.mark.skipif(
+    "MUJOCO_GL" not in os.environ, reason="nothing says how to draw off-screen: MUJOCO_GL=egl or osmesa"
+)
 def test_a_session_without_a_camera_is_drawn_anew(tmp_path):
     cv2 = pytest.importorskip("cv2")
     path, out = tmp_path / "learnt.mcap", tmp_path / "out.mp4"
