@@ -38,6 +38,10 @@ class RigCamera(Section, frozen=True, kw_only=True):
     """How many frames a second are asked of it."""
     exposure: Annotated[float, Meta(ge=0.0, le=1e6)] | None = None
     """What a driver's exposure is locked at, in that driver's own unit (100 µs on Linux); None: by itself."""
+    recorded: Annotated[str, Meta(pattern=r"^(jpeg|png|none)\Z")] = "jpeg"
+    """How its frames are kept in sessions; PNG keeps each pixel, at some ten times the size."""
+    recorded_quality: Annotated[int, Meta(ge=1, le=100)] = 85
+    """Of a JPEG."""
 
 
 class NodeStart(Section, frozen=True, kw_only=True):
@@ -98,6 +102,8 @@ class Rig(Section, frozen=True, kw_only=True):
     physics_s: Annotated[float, Meta(ge=0.0005, le=0.01)] = 0.002
     realtime_priority: Annotated[int, Meta(ge=0, le=90)] = 0
     """SCHED_FIFO priority that a servo process of its own asks for; 0 takes its share of time as all do."""
+    recorded_ticks: Annotated[str, Meta(pattern=r"^(whole|around_stops)\Z")] = "whole"
+    """Which ticks of an arm on a wire go into sessions: every one, or 50 a second and every one around a stop."""
     max_latches: Annotated[int, Meta(ge=0, le=10_000)] = 20
     """More latches than this within latch_window resets and a run fails: something is wrong that no reset mends."""
     latch_window: Annotated[int, Meta(ge=1, le=100_000)] = 200

@@ -19,6 +19,7 @@ from robot.operated import OperatedStation, operator_of
 from robot.recording.bus_account import BusAccount
 from robot.rigs import find_station
 from robot.station_doors import Accountable
+from robot.tick_ring import TickReader, ticks_of
 from robot.tick_tap import TickTap
 
 __all__ = ["RobotLearner", "build_agent", "learner_maker"]
@@ -62,6 +63,11 @@ class RobotLearner:
     def measured(self) -> ArmState:
         """Return the newest measurement."""
         return self._local.measured
+
+    @property
+    def ticks(self) -> TickReader | None:
+        """What reads the arm's ticks, where a process of this one's own holds it."""
+        return ticks_of(self._local)
 
     def account(self, resolved: Resolved, *, seed: int) -> BusAccount | None:
         """Return a way to tell a recorder on the bus what is learnt from; None where the arm is held at home."""

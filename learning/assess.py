@@ -133,7 +133,7 @@ def _recorded_learner(
     if recording is None:
         return learner, learner.station
     learner.agent.witness = RecordedDecisions(recording, [goal.name for goal in manifest.goals])
-    return learner, recording.station(learner.station, measure=learner.measured)
+    return learner, recording.station(learner.station, measure=learner.measured, ticks=learner.ticks)
 
 
 class _Count:

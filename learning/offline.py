@@ -19,9 +19,10 @@ from learning.preceding import imagined, preceding
 from robot.bus.topics import PERCEPT
 from robot.messages import Percept, StationSpec
 from robot.recording.errors import UnfitError
+from robot.recording.messages import EpisodeEnd
 from robot.recording.origin import resolved_of
 from robot.recording.session_file import SessionFile
-from robot.recording.topics import RESET_MARK
+from robot.recording.topics import EPISODE, RESET_MARK
 
 __all__ = ["Origin", "Taught", "teach"]
 
@@ -112,13 +113,17 @@ def _show_ways(experts: ExpertSet, shown: Sequence[Shown], n_goals: int) -> None
 
 
 def _epochs_of(session: SessionFile) -> Iterator[list[Percept]]:
-    """Yield the percepts of each epoch that began with a reset."""
+    """Yield the percepts of each epoch that began with a reset, or of each episode that whoever drove has kept."""
     percepts: list[Percept] | None = None
-    for topic, _, message in session.messages(RESET_MARK, PERCEPT):
-        if topic is RESET_MARK:
+    for topic, _, message in session.messages(RESET_MARK, PERCEPT, EPISODE):
+        if topic is RESET_MARK or (topic is EPISODE and message.end is None):
             if percepts:
                 yield percepts
             percepts = []
+        elif topic is EPISODE:
+            if percepts and message.end is EpisodeEnd.KEPT:
+                yield percepts
+            percepts = None
         elif percepts is not None:
             percepts.append(message)
     if percepts:

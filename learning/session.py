@@ -136,9 +136,11 @@ class Session:
 
     def _station(self, purpose: Purpose) -> Station:
         station: Station = self._learner.station
-        for recording in (self._recording, self._account):
-            if recording is not None:
-                station = recording.station(station, purpose=purpose, measure=self._learner.measured)
+        learner = self._learner
+        if self._recording is not None:
+            station = self._recording.station(station, purpose=purpose, measure=learner.measured, ticks=learner.ticks)
+        if self._account is not None:
+            station = self._account.station(station, purpose=purpose)
         return station
 
     def _heard(self) -> tuple[RecordedDecisions, ...]:

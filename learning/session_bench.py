@@ -28,6 +28,7 @@ from robot.bench import BenchReport, BenchResult, bench_report
 from robot.bus.topics import ARM_STATE
 from robot.messages import ArmMode, ArmState, GripState
 from robot.oracle import rules_oracle
+from robot.recording.bench_wire import frame_rows, tick_rows
 from robot.recording.messages import Purpose
 from robot.recording.recorder import Recorder
 from robot.recording.recording import Recording
@@ -39,6 +40,7 @@ from robot.rigs import load
 __all__ = ["bench_session"]
 
 N_MESSAGES, N_TURNS = 40_000, 5
+N_TICKS, CAMERA_HZ = 10_000, 15.0
 N_EPOCHS, N_EPOCHS_FULL = 8, 60
 SHOWS = "sim_twin.demonstrator:record_demonstrations"
 N_SHOWN, N_TESTS, LEAST = 20, 20, 0.9
@@ -51,7 +53,11 @@ def bench_session(*, full: bool) -> BenchReport:
     """Measure; full records and replays a longer run, and teaches a learner by scripted demonstrations alone."""
     started_s = perf_counter()
     with TemporaryDirectory() as folder:
-        rows = _files(Path(folder)) + _run(Path(folder) / "run.mcap", N_EPOCHS_FULL if full else N_EPOCHS)
+        rows = (
+            _files(Path(folder))
+            + _wire(Path(folder))
+            + _run(Path(folder) / "run.mcap", N_EPOCHS_FULL if full else N_EPOCHS)
+        )
         rows += _shown(Path(folder) / "shown.mcap") if full else []
     return bench_report("session", rows, seconds=perf_counter() - started_s)
 
@@ -79,6 +85,11 @@ def _files(folder: Path) -> list[BenchResult]:
         _rate("bare_read_msgs_per_s", read_bare),
         BenchResult(name="read_ratio", value=read_ratio, unit="of bare mcap"),
     ]
+
+
+def _wire(folder: Path) -> list[BenchResult]:
+    """Record ticks as they come over a wire, and frames."""
+    return tick_rows(folder, [_state(n) for n in range(N_TICKS)]) + frame_rows(rate_hz=CAMERA_HZ)
 
 
 def _rate(name: str, seconds: list[float]) -> BenchResult:

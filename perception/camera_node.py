@@ -11,11 +11,12 @@ from config.resolved import Resolved
 from perception.cameras.ring import FrameWriter
 from robot.bus import Bus, Role
 from robot.bus.camera_rows import FrameNote
-from robot.bus.topics import CAMERA_FRAME
+from robot.bus.topics import CAMERA_FRAME, CAMERA_IMAGE
 from robot.errors import RobotConfigError, RobotError
 from robot.frames import Frame
 from robot.hal.protocols import Camera
 from robot.node.pulse import HealthTeller, Pulse
+from robot.recording.images import ImageCoder, image_coder
 from robot.rigs import build_camera, check_usable
 
 __all__ = ["CameraNode", "run_camera"]
@@ -32,14 +33,18 @@ class CameraNode:
     Args:
         bus: open; this process is a camera there.
         camera: not yet connected to.
+        images: compresses frames for whoever records them; None where nobody may.
         now_ns: this process's monotonic clock.
 
     Attributes:
         pulse: how its frames come.
     """
 
-    def __init__(self, bus: Bus, camera: Camera, *, now_ns: Callable[[], int] = monotonic_ns) -> None:
-        self._camera, self._now_ns = camera, now_ns
+    def __init__(
+        self, bus: Bus, camera: Camera, *, images: ImageCoder | None = None, now_ns: Callable[[], int] = monotonic_ns
+    ) -> None:
+        self._camera, self._images, self._now_ns = camera, images, now_ns
+        self._pictures = bus.publisher(CAMERA_IMAGE)
         self._owner = f"{bus.serial}.{bus.source}"
         self._notes = bus.publisher(CAMERA_FRAME)
         self._memory: FrameWriter | None = None
@@ -109,6 +114,8 @@ class CameraNode:
             number=number,
         )  # fmt: skip
         self._notes.put(note, stamp_ns=frame.stamp_ns)
+        if self._images is not None and self._pictures.is_read:
+            self._pictures.put(self._images.encode(frame), stamp_ns=frame.stamp_ns)
         self.pulse.beat()
         self.pulse.doing = "shows"
 
@@ -134,7 +141,7 @@ def run_camera(resolved: Resolved, *, end: Callable[[], bool]) -> None:
     if rig.bus is None:
         raise RobotConfigError(f"rig {rig.name}: expected the endpoint of its bus, came none: its processes are one")
     with Bus(rig.bus, serial=rig.expected.serial, role=Role.CAMERA, keys=rig.keys) as bus:
-        node = CameraNode(bus, build_camera(resolved, bus))
+        node = CameraNode(bus, build_camera(resolved, bus), images=image_coder(rig.camera))
         health = HealthTeller(bus, node.pulse)
         try:
             node.run(end)

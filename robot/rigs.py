@@ -13,6 +13,7 @@ from config.resolved import Resolved
 from config.rig import Rig
 from config.scenario import Scenario
 from robot.errors import RobotConfigError
+from robot.frame_tap import tapped
 from robot.hal.protocols import Camera, Plant
 from robot.local_station import LocalStation
 from robot.motion import AskedHand
@@ -84,7 +85,7 @@ def build_station(
             is good enough.
         cell_shows: Shows a text at the cell of an arm that is held in this process; a rig with a bus has its own.
         host_ns: This process's monotonic time, for leases and answers at the cell; never for motion.
-        tap: Hears of every tick, where the arm is held in this process.
+        tap: Hears of every tick, where the arm is held in this process, and of every frame, where it is a tap of those.
     """
     rig, arm, scenario = resolved.rig, resolved.arm, resolved.scenario
     check_usable(rig)
@@ -97,7 +98,7 @@ def build_station(
     if heard_by is not None:
         time_world(world, heard_by)
     if isinstance(perception, Sighted):
-        perception.watch(world.cameras)
+        perception.watch(tapped(world.cameras, tap))
     loop = TickLoop(
         arm=world.arm, config=arm, scenario=scenario, rule_sets=resolved.rule_sets, rig=rig, profile=resolved.profile,
         tap=tap,

@@ -39,6 +39,7 @@ from robot.surroundings import Surroundings
 from robot.taking import Taking, has_come
 from robot.tick_loop import Stride
 from robot.tick_notes import TickNote
+from robot.tick_ring import TickReader, ring_bytes
 
 __all__ = ["ServoClient"]
 
@@ -61,6 +62,7 @@ class ServoClient:
 
     Attributes:
         identity: Which plant the process found; None before connect().
+        ticks: What every tick measured, asked for and was told, for whoever records; of processes that ended, too.
     """
 
     def __init__(self, resolved: Resolved, *, when_closed: Callable[[], object] | None = None) -> None:
@@ -81,6 +83,8 @@ class ServoClient:
         self._context = get_context("spawn")
         self._halt = self._context.RawArray("q", 1)
         """Shared memory: a stop was asked for, whatever the pipe is busy with."""
+        self._ring = self._context.RawArray("B", ring_bytes(1.0 / self._tick_s))
+        self.ticks = TickReader(self._ring)
         self._is_leaving = False
         """It has said that it lost its arm, or its end of the pipe is closed."""
         self._is_answer_due = False
@@ -154,7 +158,7 @@ class ServoClient:
         self._taking.wait()
         ours, theirs = self._context.Pipe()
         pulse = self._context.RawArray("q", 1)
-        shared = (pulse, self._halt, self._taking.uploaded)
+        shared = (pulse, self._halt, self._taking.uploaded, self._ring)
         process = self._context.Process(target=serve, args=(theirs, self._resolved_json, *shared), daemon=True)
         process.start()
         theirs.close()

@@ -56,6 +56,8 @@ from robot.servo_messages import (
 from robot.stdio import STDERR, STDOUT
 from robot.tick_loop import TickLoop
 from robot.tick_notes import TickNote, TickNotes
+from robot.tick_ring import TickWriter
+from robot.tick_tap import BothTaps, TickTap
 
 __all__ = ["ServoServer", "serve"]
 
@@ -88,6 +90,7 @@ def serve(
     pulse: MutableSequence[int],
     halt: MutableSequence[int],
     uploaded: MutableSequence[int],
+    ticks: MutableSequence[int],
 ) -> None:
     """Run a servo process until its station lets go of it.
 
@@ -97,6 +100,7 @@ def serve(
         pulse: shared memory of one number: ticks so far while it ticks, otherwise 0.
         halt: shared memory of one number: other than 0 once somebody said stop.
         uploaded: shared memory of one number: 1 from before anything of this process's may run on the arm.
+        ticks: shared memory that the last half minute of ticks lies in, for whoever records.
 
     SIGTERM stops the arm and ends it too. It does not return: ruckig's binding would tell of some thirty leaks at the
     interpreter's end, over what a person is to read.
@@ -122,7 +126,8 @@ def serve(
         plant.heed(lambda: bool(halt[0]))
 
     notes = TickNotes(rate_hz=plant.arm.spec.rate_hz)
-    loop = _loop_of(resolved, plant, when_latched=lambda verdict: server.latched(verdict), notes=notes)
+    tap = BothTaps(notes, TickWriter(ticks))
+    loop = _loop_of(resolved, plant, when_latched=lambda verdict: server.latched(verdict), tap=tap)
     server = ServoServer(
         connection=connection,
         plant=plant,
@@ -152,12 +157,10 @@ def serve(
     os._exit(code)
 
 
-def _loop_of(
-    resolved: Resolved, plant: Plant, *, when_latched: Callable[[Verdict], object], notes: TickNotes
-) -> TickLoop:
+def _loop_of(resolved: Resolved, plant: Plant, *, when_latched: Callable[[Verdict], object], tap: TickTap) -> TickLoop:
     return TickLoop(
         arm=plant.arm, config=resolved.arm, scenario=resolved.scenario, rule_sets=resolved.rule_sets, rig=resolved.rig,
-        profile=resolved.profile, when_latched=when_latched, tap=notes,
+        profile=resolved.profile, when_latched=when_latched, tap=tap,
     )  # fmt: skip
 
 

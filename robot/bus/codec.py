@@ -38,15 +38,16 @@ class Codec(Generic[T]):
 
     Args:
         kind: A Struct with at most one field of bytes.
+        is_whole: A field of bytes is in the JSON, too, in base 64, as files and viewers have it.
 
     Attributes:
         kind: The same.
         schema: Its hash.
     """
 
-    def __init__(self, kind: type[T]) -> None:
+    def __init__(self, kind: type[T], *, is_whole: bool = False) -> None:
         self.kind, self.schema = kind, schema_hash(kind)
-        blobs = [field.name for field in msgspec.structs.fields(kind) if field.type is bytes]
+        blobs = [field.name for field in msgspec.structs.fields(kind) if field.type is bytes and not is_whole]
         assert len(blobs) <= 1, f"{kind.__name__}: at most one field of bytes"
         self._blob = blobs[0] if blobs else None
         self._encode = msgspec.json.Encoder().encode

@@ -11,13 +11,16 @@ import msgspec
 from robot.bus.account_rows import AccountPart, AccountWritten
 from robot.bus.camera_rows import Forget, Forgotten, FrameNote, Light, TwinPose
 from robot.bus.station_rows import Beat, Command, Health, StationAsk, StationReport, StationTold, StepDone, StopAsk
+from robot.bus.tick_rows import TickBatch
 from robot.bus.topic import Keep, Priority, Query, Role, Topic
 from robot.messages import ArmCommand, ArmState, Percept, SceneState, Verdict
+from robot.viewer_messages import CompressedImage
 
 __all__ = [
-    "ACCOUNT", "ARM_STATE", "ASK", "BEAT", "CAMERA_FRAME", "CELL", "FORGET", "HEALTH", "INTENT", "LAY_OUT", "LIGHT",
-    "PERCEPT", "PING", "QUERIES", "REPORT", "REQUESTED", "RESET", "SENT", "STEP", "STOP", "TOPICS", "TRUTH",
-    "TWIN_POSE", "VERDICT", "WRITTEN", "CellAction", "CellTruth", "Ping", "Pong", "ResetDone", "ResetRequest",
+    "ACCOUNT", "ARM_STATE", "ASK", "BEAT", "CAMERA_FRAME", "CAMERA_IMAGE", "CELL", "FORGET", "HEALTH", "INTENT",
+    "LAY_OUT", "LIGHT", "PERCEPT", "PING", "QUERIES", "REPORT", "REQUESTED", "RESET", "SENT", "STEP", "STOP", "TICKS",
+    "TOPICS", "TRUTH", "TWIN_POSE", "VERDICT", "WRITTEN", "CellAction", "CellTruth", "Ping", "Pong", "ResetDone",
+    "ResetRequest",
 ]  # fmt: skip
 
 
@@ -84,6 +87,8 @@ SENT = Topic(
 VERDICT = Topic(
     name="verdict", kind=Verdict, writers=(Role.ROBOT,), rate_hz=50.0, deadline_s=0.06, priority=Priority.DATA_HIGH
 )
+TICKS = Topic(name="arm/ticks", kind=TickBatch, writers=(Role.ROBOT,), rate_hz=20.0, keep=Keep.ALL)
+"""Every tick, some at a time, for who records: as measurement, command and verdict it is written then."""
 TRUTH = Topic(
     name="twin/truth", kind=SceneState, writers=(Role.TWIN,), rate_hz=100.0, deadline_s=0.1, priority=Priority.DATA_HIGH
 )
@@ -97,6 +102,8 @@ CAMERA_FRAME = Topic(
     priority=Priority.DATA_HIGH, is_recorded=False,
 )  # fmt: skip
 """One key for all cameras, told apart by the source and the note. The pictures themselves lie in shared memory."""
+CAMERA_IMAGE = Topic(name="camera/image", kind=CompressedImage, writers=(Role.CAMERA,), rate_hz=20.0, keep=Keep.ALL)
+"""The same frames, compressed, for who records; whoever perceives takes them from shared memory."""
 LIGHT = Topic(name="camera/light", kind=Light, writers=(Role.PERCEPTION,), rate_hz=2.0)
 PERCEPT = Topic(
     name="percept", kind=Percept, writers=(Role.PERCEPTION, Role.ROBOT), rate_hz=50.0, deadline_s=0.15,
@@ -159,6 +166,6 @@ PING = Query(name="bus/ping", request=Ping, reply=Pong, answered_by=tuple(Role),
 
 TOPICS: tuple[Topic[Any], ...] = (
     ARM_STATE, REQUESTED, SENT, VERDICT, TRUTH, TWIN_POSE, CAMERA_FRAME, LIGHT, PERCEPT, INTENT, STEP, BEAT, STOP,
-    REPORT, HEALTH, ACCOUNT, WRITTEN,
+    REPORT, HEALTH, ACCOUNT, WRITTEN, TICKS, CAMERA_IMAGE,
 )  # fmt: skip
 QUERIES: tuple[Query[Any, Any], ...] = (RESET, CELL, FORGET, ASK, LAY_OUT, PING)

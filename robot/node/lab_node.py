@@ -14,6 +14,7 @@ import typer
 from config.limited import limited
 from config.resolved import Resolved
 from robot.bus import Bus, Role
+from robot.bus.topics import TICKS
 from robot.bus.twin_link import RemoteResetter, RemoteTruth
 from robot.errors import RobotConfigError
 from robot.hal.protocols import Resetter, SceneTruth
@@ -30,6 +31,7 @@ from robot.person_table import PerceivedTable
 from robot.rigs import build_operator, build_perception, check_usable
 from robot.servo_client import ServoClient
 from robot.station_doors import Perceives
+from robot.ticks_told import TickTeller
 
 __all__ = ["open_robot_node"]
 
@@ -95,6 +97,8 @@ def open_robot_node(resolved: Resolved, *, pictures: Path = Path("resets")) -> G
             is_attended=is_armed_by_person or rig.reset == "person",
             person=_operator(tend) if is_armed_by_person else None,
         )
+        ticks = bus.publisher(TICKS)
+        stack.callback(TickTeller(loop.ticks, put=ticks.put, is_read=lambda: ticks.is_read).close)
         stack.callback(node.close)
         stack.callback(HealthTeller(bus, node.pulse).close)
         yield node

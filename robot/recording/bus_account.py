@@ -8,7 +8,6 @@ from time import monotonic_ns
 import msgspec
 
 from config.resolved import Resolved, dump_resolved
-from robot.messages import ArmState
 from robot.recording.account import Account
 from robot.recording.messages import Purpose
 from robot.recording.opening import OPENING, Opening
@@ -59,11 +58,8 @@ class BusAccount:
         self._station: RecordedStation | None = None
         self._is_closed = False
 
-    def station(
-        self, station: Station, *, purpose: Purpose | None = None, measure: Callable[[], ArmState] | None = None
-    ) -> RecordedStation:
+    def station(self, station: Station, *, purpose: Purpose | None = None) -> RecordedStation:
         """Return a station of which is told; what its arm measures and is sent, a recorder hears on the bus itself."""
-        del measure
         is_own = purpose in (None, Purpose.LEARN)
         told = RecordedStation(
             station, self.recorder, purpose=purpose or Purpose.LEARN, now_ns=self._now_ns,

@@ -15,7 +15,10 @@ import msgspec
 
 from robot.bus import Bus, Received, Topic
 from robot.bus.account_rows import AccountPart, AccountWritten
-from robot.bus.topics import ACCOUNT, WRITTEN
+from robot.bus.errors import BusError
+from robot.bus.tick_rows import TickBatch
+from robot.bus.topics import ACCOUNT, ARM_STATE, PERCEPT, TICKS, WRITTEN
+from robot.messages import ArmState
 from robot.node.pulse import Pulse
 from robot.recording.account_order import AccountOrder
 from robot.recording.errors import DamagedError
@@ -23,6 +26,7 @@ from robot.recording.messages import Event
 from robot.recording.opening import OPENING, Opening
 from robot.recording.recording import Recording
 from robot.recording.session_files import SessionFiles
+from robot.recording.told_ticks import ToldTicks
 from robot.recording.topics import EVENT, RECORDED, as_on_the_bus
 
 __all__ = ["BusRecorder"]
@@ -52,6 +56,10 @@ class BusRecorder:
         self._files, self._order = files, AccountOrder()
         self._is_told, self._is_open = False, False
         self._recording: Recording = files.watch()
+        first = self._recording
+        self._ticks = ToldTicks(first.wire_ticks, is_sure=first.is_on_a_wire, is_aside=first.are_ticks_aside)
+        self._shown = self._recording.shown()
+        self._measured: ArmState | None = None
         self._came: Queue[Came] = Queue(MOST_WAITING)
         self._newest_ns = self._offset_ns = self._n_missed = 0
         self._written = AccountWritten(account=0, number=-1, is_open=False)
@@ -87,6 +95,7 @@ class BusRecorder:
         """Finish the file. Idempotent."""
         order = self._order
         self._recording.close()
+        self._files.close()
         if order.account and self._recording.recorder.n_lost == 0:
             self._says.put(AccountWritten(account=order.account, number=order.number, is_open=self._is_open))
 
@@ -113,11 +122,25 @@ class BusRecorder:
         if topic is ACCOUNT:
             self._hear(received)
             return
-        named = as_on_the_bus(topic, is_told=self._is_told)
+        if topic is TICKS:
+            self._take_ticks(received)
+            return
+        named = self._ticks.named(as_on_the_bus(topic, is_told=self._is_told), received.message)
         self._recording.recorder.write(
             named, received.message, log_ns=self._newest_ns, stamp_ns=max(0, received.stamp_ns)
         )
         self.n += 1
+        if topic is ARM_STATE:
+            self._measured = received.message
+        elif topic is PERCEPT:
+            state = self._ticks.state or self._measured
+            self._shown.perceived(received.message, state, log_ns=self._newest_ns)
+
+    def _take_ticks(self, received: Received[TickBatch]) -> None:
+        try:
+            self.n += self._ticks.take_batch(received)
+        except BusError as error:
+            self.pulse.fail(str(error))
 
     # ------------------------------------------------------------------------------------------------------- account
 
@@ -170,3 +193,5 @@ class BusRecorder:
             return
         self._recording.close()
         self._recording, self._is_told = begun, True
+        self._ticks.go_on(begun.wire_ticks)
+        self._shown = begun.shown()

@@ -4,30 +4,42 @@ Errors make a session unfit to learn from or to replay; warnings are worth a loo
 """
 
 import itertools
+from bisect import bisect_right
 from collections.abc import Iterator
 from enum import StrEnum
 
 import msgspec
 
-from robot.bus.topics import ARM_STATE, PERCEPT, REQUESTED, SENT, VERDICT
+from robot.bus.topics import ARM_STATE, CAMERA_IMAGE, HEALTH, PERCEPT, REQUESTED, SENT, STOP, VERDICT
 from robot.recording.errors import DamagedError
 from robot.recording.messages import Purpose
-from robot.recording.recording import CONFIG, MODEL, VERSIONS
+from robot.recording.recording import CONFIG, MODEL, STOPPED, VERSIONS
 from robot.recording.session_file import Raw, SessionFile
 from robot.recording.topics import EPOCH, EVENT, GOAL, INTENT, RECORDED, RESET_MARK, STATION, STEP
 
 __all__ = ["Checked", "Finding", "Severity", "Stream", "check", "lines"]
 
+PAUSE_NS = 500_000_000
+Excused = tuple[list[tuple[int, int]], list[tuple[int, int]]]
+"""Spans that a gap may touch, and those that it may lie in."""
 GAP = 3.0
 """Times the usual distance between two messages."""
+LATE_NS = 20_000_000
+"""Ticks of 2 ms that came no later than this were late, and nothing was lost."""
+BEFORE_NS = 1_000_000_000
+"""So long an arm on a wire may go on ticking after somebody began to lay its table out."""
 FROZEN_N = 50
 """So many measurements in a row that are the same to the last bit: no sensor is that quiet while something moves."""
+N_SAME_FRAMES = 5
+"""So many pictures in a row that are the same to the last bit: no sensor is without noise."""
 MOVING_RAD = 1e-3
 OFTEN = 0.5
 """Share of steps that a limiter has a hand in, from which actions count as clipped."""
 NEEDED = (CONFIG, MODEL, VERSIONS)
-STEADY = (ARM_STATE.name, REQUESTED.name, SENT.name, VERDICT.name, PERCEPT.name)
+STEADY = (ARM_STATE.name, REQUESTED.name, SENT.name, VERDICT.name, PERCEPT.name, CAMERA_IMAGE.name)
 """Streams that should come at a rate while the arm is driven."""
+OF_MANY = (HEALTH.name, STOP.name)
+"""Written by every process: stamps of one say nothing of another's."""
 EXCUSES = (RESET_MARK.name, EVENT.name)
 """What excuses a gap, or a percept that is the one before: a table that is laid out, a step that was cut short."""
 DRIFT = 1e-3
@@ -106,12 +118,17 @@ def check(session: SessionFile) -> Checked:
         by_topic: dict[str, list[Raw]] = {}
         for raw in session.raw():
             by_topic.setdefault(session.topic_of(raw.channel), []).append(raw)
-        excused = [raw.log_ns for topic in EXCUSES for raw in by_topic.get(topic, [])]
+        lasts_ns = BEFORE_NS if session.about.get("clock") == "host" else 0
+        excused = [(raw.log_ns, raw.log_ns + lasts_ns) for topic in EXCUSES for raw in by_topic.get(topic, [])]
+        pauses = _pauses(by_topic.get(STEP.name, []), by_topic.get(INTENT.name, [])) if lasts_ns else []
         for topic, raws in sorted(by_topic.items()):
             streams.append(_stream(topic, raws))
-            _look_at_times(topic, raws, excused, found)
-        _look_at_epochs(session, found)
+            _look_at_times(topic, raws, (excused, pauses), found)
+        if STOPPED not in session.about:  # a stop's file begins and ends within an epoch
+            _look_at_epochs(session, found)
+        _look_at_events(session, found)
         _look_at_joints(session, found)
+        _look_at_frames(session, found)
         _look_at_limiters(session, found)
     except DamagedError as error:
         found.add("damaged", "", str(error))
@@ -145,7 +162,7 @@ def _stream(topic: str, raws: list[Raw]) -> Stream:
     return Stream(topic=topic, n=len(raws), first_s=raws[0].log_ns / 1e9, last_s=raws[-1].log_ns / 1e9, usual_s=usual)
 
 
-def _look_at_times(topic: str, raws: list[Raw], excused: list[int], found: _Findings) -> None:
+def _look_at_times(topic: str, raws: list[Raw], excused: Excused, found: _Findings) -> None:
     """Stamps that go back, come twice, drift or are missing; messages lost on their way into the file."""
     sequence: dict[int, int] = {}
     for raw in raws:
@@ -155,26 +172,48 @@ def _look_at_times(topic: str, raws: list[Raw], excused: list[int], found: _Find
             found.add("lost messages", topic, detail, at_ns=raw.log_ns)
         sequence[raw.channel] = raw.sequence + 1
     for a, b in itertools.pairwise(raws):
-        if b.publish_ns < a.publish_ns:
+        if b.publish_ns < a.publish_ns and topic not in OF_MANY:
             detail = f"a stamp of {b.publish_ns / 1e9:.6f} s after one of {a.publish_ns / 1e9:.6f} s"
             found.add("stamps go back", topic, detail, at_ns=b.log_ns)
     if topic in STEADY:
         _look_at_rate(topic, raws, excused, found)
 
 
-def _look_at_rate(topic: str, raws: list[Raw], excused: list[int], found: _Findings) -> None:
+def _is_excused(begin_ns: int, end_ns: int, excused: Excused) -> bool:
+    touched, around = excused
+    return any(begin <= end_ns and begin_ns <= end for begin, end in touched) or any(
+        begin <= begin_ns + LATE_NS and end_ns <= end + LATE_NS for begin, end in around
+    )
+
+
+def _pauses(steps: list[Raw], intents: list[Raw]) -> list[tuple[int, int]]:
+    """Return the spans in which nobody asked anything of an arm on a wire: while it is armed again it does not tick."""
+    asked_ns = [raw.log_ns for raw in intents]
+    found: list[tuple[int, int]] = []
+    for raw in steps:
+        n = bisect_right(asked_ns, raw.log_ns)
+        until_ns = asked_ns[n] if n < len(asked_ns) else raw.log_ns
+        if until_ns - raw.log_ns > PAUSE_NS:
+            found.append((raw.log_ns, until_ns))
+    return found
+
+
+def _look_at_rate(topic: str, raws: list[Raw], excused: Excused, found: _Findings) -> None:
     """Gaps, duplicates and drift of a stream that should be steady; resets and stops take their own time, or none."""
     distances = sorted(b.publish_ns - a.publish_ns for a, b in itertools.pairwise(raws))
     usual = distances[len(distances) // 2] if distances else 0
     for a, b in itertools.pairwise(raws):
         far = b.publish_ns - a.publish_ns
-        is_excused = (far == 0 or far > GAP * usual) and any(a.log_ns <= at <= b.log_ns for at in excused)
-        if is_excused:
+        is_odd = far == 0 or far > GAP * usual
+        if is_odd and _is_excused(a.log_ns, b.log_ns, excused):
             continue
         if far == 0 and a.payload == b.payload:
             found.add("duplicate", topic, f"the message of {a.publish_ns / 1e9:.6f} s came twice", at_ns=b.log_ns)
         elif usual and far > GAP * usual:
-            found.add("gap", topic, f"{far / 1e9:.3f} s, usually {usual / 1e9:.3f} s", at_ns=a.log_ns)
+            is_late = far <= LATE_NS
+            kind, severity = ("late", Severity.WARNING) if is_late else ("gap", Severity.ERROR)
+            detail = f"{far / 1e9:.3f} s, usually {usual / 1e9:.3f} s"
+            found.add(kind, topic, detail, at_ns=a.log_ns, severity=severity)
     if len(raws) > FROZEN_N:
         first, last = raws[0], raws[-1]
         log, own = last.log_ns - first.log_ns, last.publish_ns - first.publish_ns
@@ -198,6 +237,10 @@ def _look_at_epochs(session: SessionFile, found: _Findings) -> None:
         found.add("no outcome", EPOCH.name, f"epoch {epoch} was begun and has no outcome", at_ns=at_ns)
     if about.get("purpose") == Purpose.LEARN.value and not any(True for _ in session.messages(STATION)):
         found.add("no station", STATION.name, "expected what the station is, there is nothing")
+
+
+def _look_at_events(session: SessionFile, found: _Findings) -> None:
+    """What was noted while it was recorded."""
     for _, raw, event in session.messages(EVENT):
         found.add("event", EVENT.name, f"{event.what}: {event.detail}", at_ns=raw.log_ns, severity=Severity.WARNING)
 
@@ -219,6 +262,18 @@ def _look_at_joints(session: SessionFile, found: _Findings) -> None:
             if moved > MOVING_RAD:
                 detail = f"{FROZEN_N} measurements are the same while joints were told to move by {moved:.4f} rad"
                 found.add("frozen", ARM_STATE.name, detail, at_ns=begun_ns)
+
+
+def _look_at_frames(session: SessionFile, found: _Findings) -> None:
+    """Pictures that are the same to the last bit: a camera that hangs, and goes on telling its last one."""
+    before: dict[str, bytes] = {}
+    n_same: dict[str, int] = {}
+    for _, raw, image in session.messages(CAMERA_IMAGE):
+        name, is_same = image.frame_id, before.get(image.frame_id) == image.data
+        before[name], n_same[name] = image.data, n_same.get(name, 0) + 1 if is_same else 0
+        if n_same[name] == N_SAME_FRAMES:
+            detail = f"camera {name}: {N_SAME_FRAMES} pictures in a row are the one before, to the last bit"
+            found.add("frozen", CAMERA_IMAGE.name, detail, at_ns=raw.log_ns)
 
 
 def _look_at_limiters(session: SessionFile, found: _Findings) -> None:

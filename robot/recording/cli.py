@@ -20,17 +20,24 @@ from robot.recording.session_file import SessionFile
 from robot.recording.telling import about_session
 from robot.rigs import load
 from robot.stdio import STDERR, redirected_stdout
+from robot.stop_request import StopRequest
 
 __all__ = ["app"]
 
 EXIT_FAILED = 1
-REPLAYERS = {"learning": "learning.replaying:replay_session", "twin": "robot.recording.replay_to_arm:replay_to_arm"}
+REPLAYERS = {
+    "learning": "learning.replaying:replay_session",
+    "twin": "robot.recording.replay_to_arm:replay_to_arm",
+    "arm": "robot.recording.replay_to_wire:replay_to_wire",
+    "bus": "robot.recording.replay_to_bus:replay_to_bus",
+}
 """Who replays a session; learning is not known here."""
 EXPORTERS = {
     "lerobot": "robot.recording.exporting.lerobot:export_lerobot",
     "minari": "robot.recording.exporting.minari_set:export_minari",
 }
 """Loaded when asked for: they bring libraries of their own."""
+VIEWER = "viewer"
 MOST_LOST = 10
 
 app = typer.Typer(
@@ -91,13 +98,22 @@ def check(session: Session, *, json: Json = False) -> None:
 @app.command()
 def export(
     sessions: Annotated[list[Path], typer.Argument(help="Sessions' files, into one data set.")],
-    out: Annotated[Path, typer.Option("--out", "-o", help="Its folder; nothing is overwritten.")],
+    out: Annotated[Path, typer.Option("--out", "-o", help="Its folder, or its file; nothing is overwritten.")],
     *,
-    to: Annotated[str, typer.Option(help="lerobot (LeRobotDataset v3.0) or minari.")] = "lerobot",
+    to: Annotated[
+        str,
+        typer.Option(help="lerobot (LeRobotDataset v3.0), minari, or viewer (one MCAP file with Protocol Buffers)."),
+    ] = "lerobot",
 ) -> None:
-    """Write sessions as a data set that others' learners read: `pip install autotelic[export]`."""
+    """Write sessions as a data set that others' learners read (`pip install autotelic[export]`), or for a viewer."""
+    if to == VIEWER and len(sessions) == 1:
+        from robot.recording.viewer_file import write_viewer_file
+
+        typer.echo(f"{out}: {write_viewer_file(sessions[0], out)}")
+        return
     if to not in EXPORTERS:
-        raise typer.BadParameter(f"expected {' or '.join(EXPORTERS)}, came {to!r}", param_hint="--to")
+        names = " or ".join([*EXPORTERS, f"{VIEWER}, of one session"])
+        raise typer.BadParameter(f"expected {names}, came {to!r}", param_hint="--to")
     from robot.recording.exporting import courses_of
 
     try:
@@ -184,11 +200,23 @@ def view(
     *,
     begin: Annotated[float, typer.Option("--from", min=0.0, help="Seconds of the session's time.")] = 0.0,
     end: Annotated[float | None, typer.Option("--to", help="Seconds; up to its end if left out.")] = None,
+    video: Annotated[
+        Path | None,
+        typer.Option(help="Write a video there (.mp4) in place of a picture: its camera's frames, or drawn anew."),
+    ] = None,
 ) -> None:
-    """Draw joints and commands, the tool, distances, verdicts and decisions over the session's time."""
-    from robot.recording.view import save_view  # brings matplotlib
+    """Draw joints and commands, tool, distances, percepts, verdicts and decisions over the session's time, or film it.
 
+    A video is of a minute, where no end is given.
+    """
     with SessionFile(session) as opened:
+        if video is not None:
+            from robot.recording.film import save_film  # brings OpenCV
+
+            typer.echo(f"{video}: {save_film(opened, video, from_s=begin, to_s=end)}")
+            return
+        from robot.recording.view import save_view  # brings matplotlib
+
         typer.echo(save_view(opened, out or session.with_suffix(".png"), from_s=begin, to_s=end))
 
 
@@ -196,20 +224,32 @@ def view(
 def replay(
     session: Session,
     *,
-    to: Annotated[str, typer.Option(help="learning, or twin.")] = "learning",
+    to: Annotated[str, typer.Option(help="learning, twin, arm (a virtual one on a wire), or bus.")] = "learning",
     rig: Annotated[
-        str | None, typer.Option(help="For twin: a shipped rig or a file; the session's own if left out.")
+        str | None, typer.Option(help="For twin and arm: a shipped rig or a file; the session's own if left out.")
     ] = None,
+    bus: Annotated[str, typer.Option(help="For bus: where it is opened, on this machine.")] = "tcp/127.0.0.1:7457",
+    rate: Annotated[float, typer.Option(min=0.01, max=100.0, help="For bus: so many times as fast.")] = 1.0,
+    begin: Annotated[float, typer.Option("--from", min=0.0, help="For bus: seconds since its beginning.")] = 0.0,
+    end: Annotated[float | None, typer.Option("--until", help="For bus: the same; its end if left out.")] = None,
     json: Json = False,
 ) -> None:
-    """Let the learner, or the twin, live through a session again; exit code 1 if it does not come to the same."""
+    """Let the learner, the twin or an arm live through a session again, or a bus tell it as if it were live.
+
+    Exit code 1 if it does not come to the same; over a wire, if not all was carried out.
+    """
     if to not in REPLAYERS:
         raise typer.BadParameter(f"expected {' or '.join(REPLAYERS)}, got {to!r}", param_hint="--to")
-    if to != "twin" and rig is not None:
-        raise typer.BadParameter("expected --to twin beside it", param_hint="--rig")
+    if to not in ("twin", "arm") and rig is not None:
+        raise typer.BadParameter("expected --to twin or arm beside it", param_hint="--rig")
     with redirected_stdout(STDERR):
         replayer = load(REPLAYERS[to])
-        done = replayer(session) if rig is None else replayer(session, rig=rig)
+        if to == "bus":
+            until_s = float("inf") if end is None else end
+            with StopRequest() as stop:
+                done = replayer(session, endpoint=bus, rate=rate, from_s=begin, to_s=until_s, should_stop=stop)
+        else:
+            done = replayer(session) if rig is None else replayer(session, rig=rig)
     if json:
         typer.echo(msgspec.json.encode(done.told()).decode())
     else:

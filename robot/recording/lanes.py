@@ -12,5 +12,7 @@ class Lane(StrEnum):
     """Measurements, commands and verdicts of every tick."""
     DECISIONS = "decisions"
     """Percepts, decisions, what became of them: all that learning needs."""
+    FRAMES = "frames"
+    """Pictures of a camera."""
     VIEW = "view"
     """What viewers draw."""

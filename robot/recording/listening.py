@@ -11,7 +11,9 @@ from queue import Empty, SimpleQueue
 from typing import Any
 
 from robot.bus import Bus, Received, Topic
+from robot.bus.topics import TICKS
 from robot.recording.recorder import Recorder
+from robot.recording.told_ticks import ToldTicks
 from robot.recording.topics import as_on_the_bus
 
 __all__ = ["BusListener"]
@@ -26,13 +28,16 @@ class BusListener:
         bus: open.
         recorder: takes it.
         topics: what is listened to.
+        ticks: takes every tick of an arm on a wire; they go into the recorder if left out.
 
     Attributes:
         n: Messages recorded.
     """
 
-    def __init__(self, bus: Bus, recorder: Recorder, topics: Iterable[Topic[Any]]) -> None:
-        self._recorder = recorder
+    def __init__(
+        self, bus: Bus, recorder: Recorder, topics: Iterable[Topic[Any]], *, ticks: ToldTicks | None = None
+    ) -> None:
+        self._recorder, self._ticks = recorder, ticks or ToldTicks(recorder)
         self._came: SimpleQueue[Came] = SimpleQueue()
         self._newest_ns = self.n = 0
         self._subscribers = [bus.subscriber(topic, partial(self._take, as_on_the_bus(topic))) for topic in topics]
@@ -63,5 +68,9 @@ class BusListener:
         except Empty:
             return
         self._newest_ns = max(self._newest_ns, received.arrived_ns)
+        if topic.name == TICKS.name:
+            self.n += self._ticks.take_batch(received)
+            return
+        topic = self._ticks.named(topic, received.message)
         self._recorder.write(topic, received.message, log_ns=self._newest_ns, stamp_ns=max(0, received.stamp_ns))
         self.n += 1

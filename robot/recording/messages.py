@@ -11,8 +11,8 @@ from robot.as_came import AsCame
 from robot.messages import Executed, Intent, StationSpec, Verdict
 
 __all__ = [
-    "Asked", "EpochOutcome", "Event", "GoalChosen", "Kept", "Purpose", "ResetMark", "StationMark", "StepMark",
-    "SubgoalChosen", "TrialEvidence",
+    "Asked", "EpisodeEnd", "EpisodeMark", "EpochOutcome", "Event", "GoalChosen", "Kept", "Purpose", "ResetMark",
+    "StationMark", "StepMark", "SubgoalChosen", "TrialEvidence",
 ]  # fmt: skip
 
 
@@ -114,6 +114,26 @@ class Kept(msgspec.Struct, frozen=True, kw_only=True):
     sha256: str
     heard: str = ""
     """Digest of all percepts and outcomes that were learnt from, byte for byte: more than the learner may notice."""
+
+
+class EpisodeEnd(StrEnum):
+    """What a driver made of an episode."""
+
+    KEPT = "kept"
+    REDONE = "redone"
+    """It is done again, at the same table; this one is not kept."""
+    DISCARDED = "discarded"
+
+
+class EpisodeMark(msgspec.Struct, frozen=True, kw_only=True):
+    """An episode of a drive begins, or ends."""
+
+    number: int
+    """Counted from 0."""
+    table: int
+    """Which table it has; the same one again where it is done again."""
+    end: EpisodeEnd | None = None
+    """None at its beginning."""
 
 
 class Event(msgspec.Struct, frozen=True, kw_only=True):

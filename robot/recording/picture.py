@@ -8,8 +8,8 @@ import math
 
 from config.arm import ArmConfig, Capsule
 from config.scenario import Box, Button, Cylinder, Scenario
+from robot import viewer_messages as v
 from robot.messages import ArmState, Percept, Quat, Vec3
-from robot.recording import viewer_messages as v
 
 __all__ = ["Picture"]
 

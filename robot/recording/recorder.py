@@ -3,8 +3,8 @@
 Topics of a kind share chunks (`Lane`), so that who needs decisions alone need not unpack what came every tick.
 """
 
-from collections.abc import Callable, Iterable, Mapping
-from typing import Any
+from collections.abc import Callable, Collection, Iterable, Mapping
+from typing import Any, Protocol
 
 import msgspec
 
@@ -16,11 +16,23 @@ from robot.recording.mcap_file import Index
 from robot.recording.records import AttachedRecord, ChannelRecord, MetadataRecord, SchemaRecord
 from robot.recording.sink import Sink
 
-__all__ = ["SCHEMA", "WORDS", "Recorder", "schema_record"]
+__all__ = ["SCHEMA", "WORDS", "Keeps", "Recorder", "schema_record"]
 
 SCHEMA, WORDS = "schema", "words"
 """Keys of a channel's metadata: the hash of its type as the bus has it, and whether its messages have numbers that are
 not finite in words (robot.bus.codec)."""
+
+
+class Keeps(Protocol):
+    """Hears of every message: a flight recorder."""
+
+    def heard(self, topic: Topic[Any], payload: bytes, *, log_ns: int, stamp_ns: int, has_words: bool) -> None:
+        """Take note of a message."""
+        ...
+
+    def look(self, message: object, *, log_ns: int) -> None:
+        """Look at what it says, where that is known."""
+        ...
 
 
 class _Channel:
@@ -37,15 +49,19 @@ class Recorder:
         sink: where chunks go.
         tell: is told once in words when something is lost.
         lanes: which topics share chunks, by a topic's name; DECISIONS where it is not named.
+        keeps: hears of every message, too.
+        unkept: names of topics whose messages it is not told: it hears of them elsewhere.
 
     Attributes:
         n_lost: Messages that the disk was too slow for, or gone.
     """
 
     def __init__(
-        self, sink: Sink, *, lanes: Mapping[str, Lane], tell: Callable[[str], object] = lambda _: None
-    ) -> None:
-        self._sink, self._tell, self._lane_of = sink, tell, lanes
+        self, sink: Sink, *, lanes: Mapping[str, Lane], tell: Callable[[str], object] = lambda _: None,
+        keeps: "Keeps | None" = None, unkept: Collection[str] = (),
+    ) -> None:  # fmt: skip
+        self._unkept = frozenset(unkept)
+        self._sink, self._tell, self._lane_of, self._keeps = sink, tell, lanes, keeps
         self._chunks = Chunks(self._hand_over)
         self._channels: dict[tuple[str, bool], _Channel] = {}
         """By topic, and whether numbers are in words."""
@@ -78,9 +94,10 @@ class Recorder:
             log_ns: when it was, by the session's clock.
             stamp_ns: what the message itself says; the same where it says nothing.
         """
-        payload, beside, has_words = self._codec(topic.kind).encode(message)
-        assert not beside, f"{topic.name}: messages with a field of bytes are not recorded as they are"
+        payload, _, has_words = self._codec(topic.kind).encode(message)
         self.put(topic, payload, log_ns=log_ns, stamp_ns=log_ns if stamp_ns is None else stamp_ns, has_words=has_words)
+        if self._keeps is not None:
+            self._keeps.look(message, log_ns=log_ns)
         return payload
 
     def encoded(self, message: msgspec.Struct) -> bytes:
@@ -92,6 +109,8 @@ class Recorder:
         channel = self._channels.get((topic.name, has_words)) or self._open(topic, has_words=has_words)
         self._chunks.add(channel.lane, channel.number, channel.n, log_ns, stamp_ns, payload)
         channel.n += 1
+        if self._keeps is not None and topic.name not in self._unkept:
+            self._keeps.heard(topic, payload, log_ns=log_ns, stamp_ns=stamp_ns, has_words=has_words)
 
     def flush(self, when_written: Callable[[], object] | None = None) -> None:
         """Hand over what waits, however little.
@@ -142,7 +161,7 @@ class Recorder:
     def _codec(self, kind: type[msgspec.Struct]) -> Codec[Any]:
         codec = self._codecs.get(kind)
         if codec is None:
-            codec = self._codecs[kind] = Codec(kind)
+            codec = self._codecs[kind] = Codec(kind, is_whole=True)
         return codec
 
 

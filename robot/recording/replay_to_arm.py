@@ -1,7 +1,7 @@
 """A session's intents once more through motion and gate of the twin that recorded them, and how well joints follow.
 
 In lock-step the same intents on the same table make the same joints, to the last bit; what differs is told. An arm on a
-wire is refused: a replay there would need somebody to attend, and a safe way to where it began.
+wire has its own time: robot.recording.replay_to_wire.
 """
 
 from bisect import bisect_left, bisect_right
@@ -24,10 +24,10 @@ from robot.recording.session_file import SessionFile
 from robot.recording.topics import INTENT, RESET_MARK, STATION
 from robot.rigs import build_operator, build_station
 
-__all__ = ["EXACT_RAD", "ReplayedToArm", "replay_to_arm"]
+__all__ = ["EXACT_RAD", "ReplayedToArm", "fitting", "replay_to_arm"]
 
 EXACT_RAD = 1e-9
-SAME = ("arm", "scenario", "rule_sets", "limits")
+SAME = ("arm", "scenario", "rule_sets", "limits", "cell")
 """What must be as it was."""
 
 
@@ -109,7 +109,12 @@ def replay_to_arm(path: Path, *, rig: str | None = None) -> ReplayedToArm:
         DamagedError: it is torn.
     """
     with SessionFile(path) as session:
-        resolved = _fitting(session, rig)
+        resolved = fitting(session, rig)
+        if resolved.rig.bus is not None:
+            raise UnfitError(
+                f"{session.path}: expected a rig in lock-step, {resolved.rig.name} is on a wire: `--to arm`; nothing "
+                "moves"
+            )
         marks = [mark for _, _, mark in session.messages(STATION)]
         if not marks:
             raise UnfitError(f"{path}: expected what its station was, there is nothing")
@@ -129,8 +134,8 @@ def replay_to_arm(path: Path, *, rig: str | None = None) -> ReplayedToArm:
     )  # fmt: skip
 
 
-def _fitting(session: SessionFile, rig: str | None) -> Resolved:
-    """Return what to replay on.
+def fitting(session: SessionFile, rig: str | None) -> Resolved:
+    """Return what to replay a session on, held to what it was recorded on.
 
     Raises:
         UnfitError: it is not what the session was recorded on.
@@ -146,8 +151,8 @@ def _fitting(session: SessionFile, rig: str | None) -> Resolved:
     changed = [name for name in SAME if getattr(then, name) != getattr(now, name)]
     if changed:
         raise UnfitError(f"{session.path}: expected the same {' and '.join(changed)} as when it was recorded")
-    if now.rig.bus is not None:
-        raise UnfitError(f"{session.path}: expected a rig in lock-step, {now.rig.name} is on a wire; nothing moves")
+    if then.rig.camera != now.rig.camera:
+        raise UnfitError(f"{session.path}: expected the same camera and calibration as when it was recorded")
     return now
 
 

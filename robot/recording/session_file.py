@@ -151,7 +151,7 @@ class SessionFile:
             DamagedError: one of them is none of its type.
             UnfitError: they were written with another version's type.
         """
-        by_name = {topic.name: (topic, Codec(topic.kind)) for topic in topics}
+        by_name = {topic.name: (topic, Codec(topic.kind, is_whole=True)) for topic in topics}
         by_channel = {
             n: (*by_name[c.topic], WORDS in c.metadata) for n, c in self.channels.items() if c.topic in by_name
         }

@@ -8,6 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from config.resolved import Resolved
+from robot.recording.flight import Flight
 from robot.recording.messages import Purpose, StationMark
 from robot.recording.opening import Opening
 from robot.recording.origin import resolved_from
@@ -31,6 +32,7 @@ class SessionFiles:
         self, folder: Path, resolved: Resolved, *, person: str, tell: Callable[[str], object] = lambda _: None
     ) -> None:
         self._folder, self._resolved, self._person, self._tell = folder, resolved, person, tell
+        self._flight = Flight(tell=tell)
 
     def watch(self) -> Recording:
         """Begin a file of what goes over the bus alone."""
@@ -60,8 +62,12 @@ class SessionFiles:
     ) -> Recording:  # fmt: skip
         return Recording(
             self._free(), resolved, purpose=purpose, seed=seed, person=self._person, about=about, attached=attached,
-            tell=self._tell,
+            tell=self._tell, flight=self._flight,
         )  # fmt: skip
+
+    def close(self) -> None:
+        """Finish what is written of a stop. Idempotent."""
+        self._flight.close()
 
     def _free(self) -> Path:
         n = 1

@@ -8,8 +8,9 @@ import msgspec
 
 from robot.as_came import as_came
 from robot.bus.topic import Topic
-from robot.bus.topics import ARM_STATE, PERCEPT, REQUESTED, SENT, VERDICT
+from robot.bus.topics import ARM_STATE, CAMERA_IMAGE, PERCEPT, REQUESTED, SENT, VERDICT
 from robot.errors import RobotError
+from robot.frames import Frame
 from robot.messages import (
     ArmCommand,
     ArmState,
@@ -21,14 +22,15 @@ from robot.messages import (
     StepResult,
     Verdict,
 )
-from robot.recording.messages import Asked, Event, Purpose, ResetMark, StationMark, StepMark
+from robot.recording.images import ImageCoder
+from robot.recording.messages import Asked, EpisodeMark, Event, Purpose, ResetMark, StationMark, StepMark
 from robot.recording.picture import Picture
 from robot.recording.recorder import Recorder
-from robot.recording.topics import EVENT, INTENT, RESET_MARK, SCENE, STATION, STEP, TF
+from robot.recording.topics import EPISODE, EVENT, INTENT, RESET_MARK, SCENE, STATION, STEP, TF
 from robot.station import Station
 from robot.teleop.driver import DrivenStation
 
-__all__ = ["Heard", "Now", "RecordedDrive", "RecordedStation", "RecordedTicks", "Writes"]
+__all__ = ["Heard", "Now", "RecordedDrive", "RecordedStation", "RecordedTicks", "Writes", "WritesBytes"]
 
 Now = Callable[[], int]
 """The session's clock."""
@@ -54,20 +56,33 @@ class Writes(Protocol):
         ...
 
 
+class WritesBytes(Writes, Protocol):
+    """Takes them as bytes, too."""
+
+    def encoded(self, message: msgspec.Struct) -> bytes:
+        """Return the payload of a message whose numbers are finite."""
+        ...
+
+    def put(self, topic: Topic[Any], payload: bytes, *, log_ns: int, stamp_ns: int, has_words: bool = False) -> None:
+        """Take one as its bytes."""
+        ...
+
+
 class RecordedTicks:
     """Implements robot.tick_tap.TickTap: measurement, request, what was sent and the verdict of every tick.
 
     Args:
         recorder: takes it.
         now_ns: the session's time; None is the arm's own, as measurements and commands are stamped with.
+        images: compresses frames; None leaves them out.
 
     Attributes:
         state: The newest measurement.
         log_ns: The session's time of it.
     """
 
-    def __init__(self, recorder: Recorder, *, now_ns: Now | None = None) -> None:
-        self._recorder, self._now_ns = recorder, now_ns
+    def __init__(self, recorder: WritesBytes, *, now_ns: Now | None = None, images: ImageCoder | None = None) -> None:
+        self._recorder, self._now_ns, self._images = recorder, now_ns, images
         self.state: ArmState | None = None
         self.log_ns = 0
 
@@ -98,6 +113,12 @@ class RecordedTicks:
         """Record a refusal that was of no command."""
         self._recorder.write(VERDICT, verdict, log_ns=self._at(verdict.stamp_ns), stamp_ns=verdict.stamp_ns)
 
+    def seen(self, frame: Frame) -> None:
+        """Record a frame, compressed; robot.frame_tap.FrameTap."""
+        if self._images is not None:
+            image = self._images.encode(frame)
+            self._recorder.write(CAMERA_IMAGE, image, log_ns=self._at(frame.arrival_ns), stamp_ns=frame.stamp_ns)
+
     def _at(self, stamp_ns: int) -> int:
         return max(self.log_ns, stamp_ns if self._now_ns is None else self._now_ns())
 
@@ -115,6 +136,7 @@ class RecordedStation:
         heard: takes percepts and outcomes into a digest.
         measure: returns the newest measurement, where ticks are not heard here: it is recorded with every step, and so
             is the command that was sent last.
+        more_ticks: records all ticks since it was called last, and tells whether nothing else of the arm need be.
     """
 
     def __init__(
@@ -128,8 +150,9 @@ class RecordedStation:
         now_ns: Now | None = None,
         heard: Heard | None = None,
         measure: Callable[[], ArmState] | None = None,
+        more_ticks: Callable[[], bool] | None = None,
     ) -> None:
-        self._measure = measure
+        self._measure, self._more_ticks = measure, more_ticks
         self._heard: Heard = heard or sha256()
         self._station, self._recorder, self._purpose = station, recorder, purpose
         self._ticks, self._picture, self._now_ns = ticks, picture, now_ns
@@ -171,7 +194,8 @@ class RecordedStation:
             self._happened("step failed", str(error))
             raise
         self._perceived(result.percept)
-        if self._measure is not None and result.executed.sent is not None:
+        is_needed = self._measure is not None and (self._more_ticks is None or not self._more_ticks())
+        if is_needed and result.executed.sent is not None:
             self._recorder.write(SENT, result.executed.sent, log_ns=self._at_ns, stamp_ns=result.executed.sent.stamp_ns)
         mark = StepMark(executed=result.executed, verdicts=result.verdicts, is_void=result.is_void)
         self._heard.update(self._recorder.write(STEP, mark, log_ns=self._at_ns))
@@ -190,7 +214,8 @@ class RecordedStation:
         state = None if self._ticks is None else self._ticks.state
         if self._measure is not None:
             state = self._measure()
-            self._recorder.write(ARM_STATE, state, log_ns=at, stamp_ns=state.stamp_ns)
+            if self._more_ticks is None or not self._more_ticks():
+                self._recorder.write(ARM_STATE, state, log_ns=at, stamp_ns=state.stamp_ns)
         if self._picture is None:
             return
         frames = self._picture.frames(state, percept)
@@ -224,11 +249,17 @@ class RecordedDrive(RecordedStation):
         picture: Picture,
         now_ns: Now | None,
         measure: Callable[[], ArmState] | None,
+        more_ticks: Callable[[], bool] | None = None,
     ) -> None:
         super().__init__(
-            station, recorder, purpose=Purpose.DRIVE, ticks=ticks, picture=picture, now_ns=now_ns, measure=measure
-        )
+            station, recorder, purpose=Purpose.DRIVE, ticks=ticks, picture=picture, now_ns=now_ns, measure=measure,
+            more_ticks=more_ticks,
+        )  # fmt: skip
         self._driven = station
+
+    def mark(self, mark: EpisodeMark) -> None:
+        """Record where an episode begins or ends."""
+        self._recorder.write(EPISODE, mark, log_ns=self._time())
 
     @property
     def measured(self) -> ArmState:

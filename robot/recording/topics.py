@@ -5,10 +5,11 @@ from typing import Any
 import msgspec
 
 from robot.bus.topic import Role, Topic
-from robot.bus.topics import ARM_STATE, PERCEPT, REQUESTED, SENT, TRUTH, VERDICT
+from robot.bus.topics import ARM_STATE, CAMERA_IMAGE, PERCEPT, REQUESTED, SENT, TRUTH, VERDICT
 from robot.recording.lanes import Lane
 from robot.recording.messages import (
     Asked,
+    EpisodeMark,
     EpochOutcome,
     Event,
     GoalChosen,
@@ -19,11 +20,11 @@ from robot.recording.messages import (
     SubgoalChosen,
     TrialEvidence,
 )
-from robot.recording.viewer_messages import FrameTransforms, SceneUpdate
+from robot.viewer_messages import FrameTransforms, SceneUpdate
 
 __all__ = [
-    "EPOCH", "EVENT", "EVIDENCE", "GOAL", "INTENT", "KEPT", "LANES", "RECORDED", "RESET_MARK", "SCENE", "STATION",
-    "STEP", "SUBGOAL", "TF", "as_on_the_bus",
+    "EPISODE", "EPOCH", "EVENT", "EVIDENCE", "GOAL", "INTENT", "KEPT", "LANES", "RECORDED", "RESET_MARK", "SCENE",
+    "STATION", "STEP", "SUBGOAL", "TF", "as_on_the_bus",
 ]  # fmt: skip
 
 _ANY = tuple(Role)
@@ -36,17 +37,20 @@ SUBGOAL = Topic(name="decision/subgoal", kind=SubgoalChosen, writers=(Role.LEARN
 EVIDENCE = Topic(name="decision/evidence", kind=TrialEvidence, writers=(Role.LEARNING,))
 EPOCH = Topic(name="decision/epoch", kind=EpochOutcome, writers=(Role.LEARNING,))
 KEPT = Topic(name="learner/state", kind=Kept, writers=(Role.LEARNING,))
+EPISODE = Topic(name="episode", kind=EpisodeMark, writers=(Role.TELEOP,))
 EVENT = Topic(name="event", kind=Event, writers=_ANY)
 TF = Topic(name="tf", kind=FrameTransforms, writers=_ANY, rate_hz=20.0)
 SCENE = Topic(name="scene", kind=SceneUpdate, writers=_ANY)
 
 RECORDED: tuple[Topic[Any], ...] = (
     ARM_STATE, REQUESTED, SENT, VERDICT, TRUTH, PERCEPT, STATION, RESET_MARK, INTENT, STEP, GOAL, SUBGOAL, EVIDENCE,
-    EPOCH, KEPT, EVENT, TF, SCENE,
+    EPOCH, KEPT, EVENT, TF, SCENE, CAMERA_IMAGE, EPISODE,
 )  # fmt: skip
-LANES = {topic.name: Lane.TICKS for topic in (ARM_STATE, REQUESTED, SENT, VERDICT, TRUTH)} | {
-    topic.name: Lane.VIEW for topic in (TF, SCENE)
-}
+LANES = (
+    {topic.name: Lane.TICKS for topic in (ARM_STATE, REQUESTED, SENT, VERDICT, TRUTH)}
+    | {topic.name: Lane.VIEW for topic in (TF, SCENE)}
+    | {CAMERA_IMAGE.name: Lane.FRAMES}
+)
 
 
 def as_on_the_bus(topic: Topic[Any], *, is_told: bool = False) -> Topic[Any]:

@@ -10,6 +10,7 @@ from robot.recording.errors import UnfitError
 from robot.recording.listening import BusListener
 from robot.recording.messages import Purpose
 from robot.recording.recording import Recording
+from robot.recording.told_ticks import ToldTicks
 from robot.stop_request import StopRequest
 
 __all__ = ["record_bus"]
@@ -41,7 +42,9 @@ def record_bus(
     with Bus(endpoint, serial=serial, role=Role.RECORDER, keys=resolved.rig.keys) as bus, StopRequest() as stop:
         recording = Recording(path, resolved, purpose=Purpose.WATCH, seed=0, person=person, tell=tell)
         try:
-            listener = BusListener(bus, recording.recorder, [topic for topic in TOPICS if topic.is_recorded])
+            topics = [topic for topic in TOPICS if topic.is_recorded]
+            ticks = ToldTicks(recording.wire_ticks, is_sure=True, is_aside=recording.are_ticks_aside)
+            listener = BusListener(bus, recording.recorder, topics, ticks=ticks)
             end_s = monotonic() + seconds if seconds else None
             listener.run(lambda: stop() or (end_s is not None and monotonic() >= end_s))
         finally:

@@ -10,7 +10,7 @@ from robot.errors import RobotConfigError
 from robot.messages import Grip, Vec3
 from robot.rigs import load
 
-__all__ = ["DEVICES", "Device", "DriverInput", "Frame", "MissingExtraError", "open_device"]
+__all__ = ["DEVICES", "Device", "DriverInput", "EpisodeKey", "Frame", "MissingExtraError", "open_device"]
 
 DEVICES = {
     "keyboard": "robot.teleop.keyboard:Keyboard",
@@ -33,6 +33,17 @@ class Frame(StrEnum):
     TOOL = "tool"
 
 
+class EpisodeKey(StrEnum):
+    """What a driver says of the episode in hand, once."""
+
+    NEXT = "next"
+    """It is kept; the next one, please."""
+    REDO = "redo"
+    """It is not kept; the same table once more."""
+    DISCARD = "discard"
+    """It is not kept; another table."""
+
+
 class DriverInput(msgspec.Struct, frozen=True, kw_only=True):
     """What a driver asks at one instant. Directions are shares of full speed, each from -1 to 1."""
 
@@ -51,6 +62,8 @@ class DriverInput(msgspec.Struct, frozen=True, kw_only=True):
     frame: Frame = Frame.BASE
     is_over: bool = False
     """The driver is done."""
+    episode: EpisodeKey | None = None
+    """What is said of the episode in hand, in the one look at the device that first sees it."""
 
 
 class Device(Protocol):

@@ -19,16 +19,19 @@ from robot.operated import AskingOperator, operator_of
 from robot.person import PersonOperator, TerminalPerson
 from robot.recording.messages import Purpose
 from robot.recording.recording import UNNAMED, Recording
+from robot.recording.taps import RecordedDrive
 from robot.rigs import build_shadow, build_view, find_station
 from robot.safety import Armable, Operator
 from robot.stop_request import StopRequest
 from robot.teleop.device import open_device
 from robot.teleop.driver import DriveEnd, DrivenStation, Driver, DriveView, Pace, Unpaced
+from robot.teleop.episodes import Episodes
 from robot.teleop.jog import Jog, JogLimits
 from robot.teleop.pace import WallPace
 from robot.teleop.preview import AheadPreview
 from robot.teleop.readout import ReadOut
 from robot.teleop.view import View
+from robot.tick_ring import ticks_of
 
 __all__ = ["DriveOptions", "Rearm", "run_drive"]
 
@@ -86,22 +89,28 @@ def run_drive(options: DriveOptions) -> None:
         recording = _open_recording(resolved, options, stack)
         tap = None if recording is None else recording.ticks
         station = stack.enter_context(find_station(resolved, is_driven=True, tap=tap))
-        driven: DrivenStation = station if recording is None else recording.drive(station)
+        driven: DrivenStation = station if recording is None else recording.drive(station, ticks=ticks_of(station))
         station.take_lease(f"teleop by {device.name}", life_ns=None if options.is_script else LEASE_NS)
-        _arm(station, driven, resolved, seed=options.seed)
+        marks = driven if isinstance(driven, RecordedDrive) else None
+        episodes = Episodes(driven, marks=marks, seed=options.seed, lays_out=resolved.rig.reset == "twin")
+        _arm(station, resolved)
+        episodes.begin()
+        stack.callback(episodes.quit)
         view = _open_view(resolved, console, stack) if options.view else None
         readout = ReadOut(keys=device.keys, console=console, now_ns=monotonic_ns)
         stack.enter_context(readout)
+        rearm = Rearm(station, readout, is_person=not options.is_script, seed=options.seed)
         driver = Driver(
             station=driven,
             device=device,
             jog=Jog(_limits(resolved, options.speed)),
             pace=pace,
             step_s=STEP_S,
-            rearm=Rearm(station, readout, is_person=not options.is_script, seed=options.seed),
+            rearm=lambda state: episodes.void(lambda: rearm(state)),
             tell=_Shown(readout, view, station),
             should_stop=end,
             preview=_open_preview(resolved, stack) if options.preview else None,
+            end_episode=episodes.end,
         )
         ended = driver.run()
     _tell(ended, as_json=options.json)
@@ -184,12 +193,10 @@ def _open_recording(resolved: Resolved, options: DriveOptions, stack: ExitStack)
     return recording
 
 
-def _arm(station: DrivenArm, driven: DrivenStation, resolved: Resolved, *, seed: int) -> None:
-    """Let the rig's operator arm the station, and a twin lay its table out."""
+def _arm(station: DrivenArm, resolved: Resolved) -> None:
+    """Let the rig's operator arm the station."""
     operator = operator_of(station, resolved.rig) or PersonOperator()
     operator.arm_once(station)
-    if resolved.rig.reset == "twin":
-        driven.reset(seed=seed, epoch=0)
 
 
 def _limits(resolved: Resolved, speed: float) -> JogLimits:

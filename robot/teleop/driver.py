@@ -8,7 +8,7 @@ import msgspec
 from robot.errors import NotEngagedError, SafetyError
 from robot.messages import ArmState, Hold, Intent, Percept, StationMode, StationState, StepResult, Vec3, Verdict
 from robot.station import Station
-from robot.teleop.device import Device, DriverInput
+from robot.teleop.device import Device, DriverInput, EpisodeKey
 from robot.teleop.jog import Jog
 
 __all__ = ["DriveEnd", "DriveView", "DrivenStation", "Driver", "Pace", "Preview", "Rearms", "Unpaced"]
@@ -121,6 +121,7 @@ class Driver:
         tell: shown every step.
         should_stop: whether somebody asked to end, as by Ctrl-C.
         preview: tries intents first, where wanted.
+        end_episode: ends an episode as the driver says, and begins the next; the arm is at rest.
     """
 
     def __init__(
@@ -135,10 +136,11 @@ class Driver:
         tell: Callable[[DriveView], None] = lambda _: None,
         should_stop: Callable[[], bool] = lambda: False,
         preview: Preview | None = None,
+        end_episode: Callable[[EpisodeKey], object] = lambda _: None,
     ) -> None:
         self._station, self._device, self._jog, self._pace = station, device, jog, pace
         self._step_s, self._rearm, self._tell = step_s, rearm, tell
-        self._should_stop, self._preview = should_stop, preview
+        self._should_stop, self._preview, self._end_episode = should_stop, preview, end_episode
         self._n_steps = self._n_latches = 0
         self._limited: dict[str, int] = {}
 
@@ -156,6 +158,9 @@ class Driver:
                 asked = self._device.read()
                 if asked.is_over or not self._is_driving(asked):
                     break
+                if asked.episode is not None and self._come_to_rest():
+                    self._end_episode(asked.episode)
+                    self._take_over()
                 self._pace.wait_step()
             is_at_rest = self._come_to_rest()
         finally:

@@ -13,7 +13,7 @@ from enum import StrEnum
 import msgspec
 
 from robot.messages import Grip, Vec3
-from robot.teleop.device import DriverInput, Frame
+from robot.teleop.device import DriverInput, EpisodeKey, Frame
 
 __all__ = ["HELD_NS", "KEYS", "PAUSE_NS", "KeyBoard", "KeyEvent", "Kind", "decode"]
 
@@ -59,6 +59,7 @@ MOVES: dict[str, tuple[Vec3, Vec3]] = {
 }
 MOVES |= {"up": MOVES["w"], "down": MOVES["s"], "left": MOVES["a"], "right": MOVES["d"]}
 MOVES |= {"pgup": MOVES["r"], "pgdn": MOVES["f"]}
+EPISODES = {"n": EpisodeKey.NEXT, "b": EpisodeKey.REDO, "backspace": EpisodeKey.DISCARD}
 OVER = ("x", "esc", "ctrl+c", "ctrl+d")
 KEYS = (
     ("w/s", "x"),
@@ -70,6 +71,7 @@ KEYS = (
     ("t", "frame"),
     ("z", "clutch"),
     ("space", "stop"),
+    ("n/b/backspace", "next, again, discard"),
     ("x", "end"),
 )
 
@@ -151,6 +153,7 @@ class KeyBoard:
         self._tells_releases = False
         self._grip: Grip | None = None
         self._speed, self._frame, self._is_clutched, self._is_over = 1.0, Frame.BASE, False, False
+        self._episode: EpisodeKey | None = None
 
     def feed(self, event: KeyEvent) -> None:
         """Take one key. Whatever is no key of the driver's, and a window that is left, lets go of everything."""
@@ -172,6 +175,7 @@ class KeyBoard:
         now_ns = self._now_ns()
         self._let_go(now_ns)
         moves = [MOVES[key] for key in self._held]
+        episode, self._episode = self._episode, None
         return DriverInput(
             stamp_ns=now_ns,
             linear=_sum([linear for linear, _ in moves]),
@@ -182,6 +186,7 @@ class KeyBoard:
             speed_share=self._speed,
             frame=self._frame,
             is_over=self._is_over,
+            episode=episode,
         )
 
     def _move(self, event: KeyEvent, now_ns: int) -> None:
@@ -219,6 +224,10 @@ class KeyBoard:
                     self._frame = Frame.TOOL if self._frame is Frame.BASE else Frame.BASE
                 elif is_fresh:
                     self._is_clutched = not self._is_clutched
+            case "n" | "b" | "backspace":
+                self._held.clear()
+                if is_fresh:
+                    self._episode = EPISODES[key]
             case _:
                 self._held.clear()
                 self._is_over |= key in OVER

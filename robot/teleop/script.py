@@ -4,6 +4,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated
 
+import msgspec
 from msgspec import Meta
 
 from config.decode import decode
@@ -12,7 +13,7 @@ from config.values import Section, Share
 from config.yaml_text import parse_yaml
 from robot.errors import RobotConfigError
 from robot.messages import Grip
-from robot.teleop.device import DriverInput, Frame
+from robot.teleop.device import DriverInput, EpisodeKey, Frame
 
 __all__ = ["Script", "ScriptStep", "ScriptedDevice", "load_script"]
 
@@ -33,6 +34,8 @@ class ScriptStep(Section, frozen=True, kw_only=True):
     grip: Grip | None = None
     speed_share: Share = 1.0
     frame: Frame = Frame.BASE
+    episode: EpisodeKey | None = None
+    """Said of the episode in hand as the step begins."""
 
 
 class Script(Section, frozen=True, kw_only=True):
@@ -79,6 +82,7 @@ class ScriptedDevice:
         if self._n_read >= len(self._asked):
             return DriverInput(stamp_ns=self._now_ns(), is_over=True, grip=self._said.grip)
         step = self._asked[self._n_read]
+        is_first = not self._n_read or self._asked[self._n_read - 1] is not step
         self._n_read += 1
         if not step.is_silent:
             self._said = DriverInput(
@@ -91,7 +95,7 @@ class ScriptedDevice:
                 speed_share=step.speed_share,
                 frame=step.frame,
             )
-        return self._said
+        return msgspec.structs.replace(self._said, episode=step.episode if is_first else None)
 
     def close(self) -> None:
         """Nothing is held."""

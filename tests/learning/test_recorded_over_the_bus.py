@@ -63,7 +63,7 @@ class Learner:
         self.bus.open()
         self.remote = RemoteStation(self.bus, asker=NodeAsker(self.bus, wait_s=5.0))
         self.account = BusAccount(self.remote.open_account(), resolved(), seed=SEED)
-        self.station = self.account.station(self.remote, measure=lambda: self.remote.measured)
+        self.station = self.account.station(self.remote)
         self.agent = build_agent(resolved(), self.station.spec, seed=SEED)
         self.heard = RecordedDecisions(self.account, [goal.name for goal in fake_rig().scenario.goals])
         self.agent.witness = self.heard

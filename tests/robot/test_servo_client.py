@@ -16,6 +16,7 @@ from robot.servo_client import COAST_S, ServoClient
 from robot.servo_messages import StrideReply
 from robot.servo_process import EXIT_TERMINATED
 from robot.tick_loop import Stride
+from robot.tick_ring import decode_tick
 from tests.support import unstoppable
 from tests.support.stations import fake_rig
 
@@ -81,12 +82,15 @@ def test_one_life_of_a_process(client):
 def test_a_process_that_was_killed_is_said_and_a_new_one_starts_without_command(client):
     client.engage()
     client.seed()
+    assert stride(client, go()).verdict is None
     os.kill(client.pid, signal.SIGKILL)
     came = stride(client, go())
     assert came.verdict.is_latched
     assert "ended" in came.verdict.detail
     assert not came.is_begun
     assert "ended" in client.why_lost
+    kept = [decode_tick(raw) for raw in client.ticks.take()]
+    assert kept[-1].command is not None, "what it did last is there"
     with pytest.raises(NotEngagedError, match="connect"):
         client.seed()
     with pytest.raises(NotEngagedError, match="connect"):

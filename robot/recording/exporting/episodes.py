@@ -14,10 +14,19 @@ import numpy.typing as npt
 from robot.bus.topics import ARM_STATE, PERCEPT
 from robot.messages import ArmCommand, ArmState, Executed, Percept
 from robot.recording.errors import UnfitError
-from robot.recording.messages import EpochOutcome, GoalChosen, Purpose, ResetMark, StepMark, SubgoalChosen
+from robot.recording.messages import (
+    EpisodeEnd,
+    EpisodeMark,
+    EpochOutcome,
+    GoalChosen,
+    Purpose,
+    ResetMark,
+    StepMark,
+    SubgoalChosen,
+)
 from robot.recording.origin import resolved_of
 from robot.recording.session_file import SessionFile
-from robot.recording.topics import EPOCH, GOAL, RESET_MARK, STATION, STEP, SUBGOAL
+from robot.recording.topics import EPISODE, EPOCH, GOAL, RESET_MARK, STATION, STEP, SUBGOAL
 
 __all__ = ["Course", "Episode", "Names", "courses_of"]
 
@@ -144,11 +153,16 @@ def _epochs_of(session: SessionFile) -> Iterator[_Open]:
     """Yield what was recorded of each epoch; a time step counts once its percept has come and a command was sent."""
     epoch: _Open | None = None
     state: ArmState | None = None
-    for _, _, message in session.messages(ARM_STATE, PERCEPT, RESET_MARK, STEP, GOAL, SUBGOAL, EPOCH):
+    mark: ResetMark | None = None
+    for _, _, message in session.messages(ARM_STATE, PERCEPT, RESET_MARK, EPISODE, STEP, GOAL, SUBGOAL, EPOCH):
         if isinstance(message, ResetMark):
             if epoch is not None:
                 yield epoch
-            epoch = _Open(mark=message)
+            epoch, mark = _Open(mark=message), message
+        elif isinstance(message, EpisodeMark):
+            if epoch is not None and message.end in (None, EpisodeEnd.KEPT):
+                yield epoch
+            epoch = None if message.end is not None or mark is None else _Open(mark=mark)
         elif isinstance(message, ArmState):
             state = message
         elif epoch is not None:

@@ -5,14 +5,19 @@ import pytest
 from typer.testing import CliRunner
 
 from robot.bus.topics import ARM_STATE, PERCEPT, SENT
+from robot.messages import Executed, Hold
 from robot.recording.checking import check
 from robot.recording.cli import app
 from robot.recording.cutting import cut, merge
 from robot.recording.errors import UnfitError
+from robot.recording.messages import Asked, StepMark
+from robot.recording.recorder import Recorder
 from robot.recording.session_file import SessionFile
-from robot.recording.topics import EPOCH, STEP
+from robot.recording.sink import Sink
+from robot.recording.topics import EPOCH, INTENT, LANES, STEP
 from tests.support.recorded import learn_a_little
 from tests.support.rewritten import with_changed
+from tests.support.stations import arm_state
 
 
 @pytest.fixture(scope="module")
@@ -144,3 +149,27 @@ def test_a_session_is_drawn(sound, tmp_path):
     picture = tmp_path / "s.png"
     assert CliRunner().invoke(app, ["view", str(sound), "-o", str(picture), "--to", "1"]).exit_code == 0
     assert picture.read_bytes().startswith(b"\x89PNG")
+
+
+@pytest.mark.parametrize(("asked_in_between", "kinds"), [(False, set()), (True, {"gap"})])
+def test_an_arm_on_a_wire_that_is_asked_nothing_need_not_tick(tmp_path, asked_in_between, kinds):
+    path = tmp_path / "wire.mcap"
+    recorder = Recorder(Sink(path, may_wait=True), lanes=LANES)
+    recorder.note("session", {"clock": "host"})
+    ms = 1_000_000
+    step = StepMark(
+        executed=Executed(duration_s=0.05, moved_m=(0.0,) * 3, target_m=(0.0,) * 3), verdicts=(), is_void=False
+    )
+    for k in range(400):  # ticks of 2 ms, a time step each 50 ms; two seconds without either in the middle
+        at = k * 2 * ms + (2000 * ms if k >= 200 else 0)
+        recorder.write(ARM_STATE, arm_state((0.0,) * 6, stamp_ns=at), log_ns=at)
+        if k % 25 == 0:
+            recorder.write(INTENT, Asked(intent=Hold()), log_ns=at)
+        if k % 25 == 24:
+            recorder.write(STEP, step, log_ns=at)
+    if asked_in_between:
+        recorder.write(INTENT, Asked(intent=Hold()), log_ns=1000 * ms)
+        recorder.write(STEP, step, log_ns=1050 * ms)
+    recorder.close()
+    with SessionFile(path) as session:
+        assert {f.kind for f in check(session).findings if f.topic == ARM_STATE.name} == kinds

@@ -14,8 +14,9 @@ from perception.cameras.over_bus import BusCamera
 from perception.cameras.ring import SHARED
 from perception.opencv import opencv
 from robot.bus import Bus, Role
-from robot.bus.topics import HEALTH
+from robot.bus.topics import CAMERA_IMAGE, HEALTH
 from robot.frames import CameraSpec, picture_of
+from robot.recording.images import decode_image
 from tests.support.small_lab import SERIAL, start
 
 pytestmark = [pytest.mark.realtime, pytest.mark.slow]
@@ -51,6 +52,8 @@ class Watcher:
         self.camera = BusCamera(bus, SPEC)
         self.camera.connect()
         bus.subscriber(HEALTH, lambda received: self.told.append(received.message))
+        self.images = {}
+        bus.subscriber(CAMERA_IMAGE, lambda received: self.images.update({received.stamp_ns: received.message}))
         self.process = None
 
     def begin(self):
@@ -90,6 +93,11 @@ def test_a_killed_camera_s_place_is_taken_by_the_next_and_no_torn_picture_is_see
         assert watcher.frames[-1].stamp_ns > stamps[-1]
         assert torn_off not in left_behind(), "what the killed one left is given back"
         assert len(watcher.frames) >= n + 10
+        both = [f for f in watcher.frames if f.stamp_ns in watcher.images]
+        assert len(both) >= 10, "who records is told the same frames, compressed"
+        for frame in both:
+            picture = decode_image(watcher.images[frame.stamp_ns])
+            assert abs(picture.astype(int) - picture_of(frame)).max() <= 4
         watcher.look_until(lambda: any(health.doing == "shows" for health in watcher.told))
         watcher.process.send_signal(signal.SIGINT)
         watcher.process.communicate(timeout=60)

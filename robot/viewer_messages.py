@@ -1,6 +1,7 @@
 """Foxglove's well-known messages, as far as they are used here: viewers know them by their names and fields.
 
-Field for field after https://docs.foxglove.dev/docs/visualization/message-schemas (FrameTransforms, SceneUpdate).
+Field for field after https://docs.foxglove.dev/docs/visualization/message-schemas (FrameTransforms, SceneUpdate,
+CompressedImage).
 """
 
 from typing import ClassVar
@@ -8,8 +9,8 @@ from typing import ClassVar
 import msgspec
 
 __all__ = [
-    "Colour", "Cube", "Cylinder", "Deletion", "FrameTransform", "FrameTransforms", "Pose", "Quaternion", "SceneEntity",
-    "SceneUpdate", "Sphere", "Stamp", "Vector", "stamp_of",
+    "Colour", "CompressedImage", "Cube", "Cylinder", "Deletion", "FrameTransform", "FrameTransforms", "Pose",
+    "Quaternion", "SceneEntity", "SceneUpdate", "Sphere", "Stamp", "Vector", "stamp_of",
 ]  # fmt: skip
 
 _NS = 1_000_000_000
@@ -127,6 +128,20 @@ class Deletion(msgspec.Struct, frozen=True, kw_only=True):
     timestamp: Stamp
     type: int = 0
     id: str
+
+
+class CompressedImage(msgspec.Struct, frozen=True, kw_only=True):
+    """A picture of a camera."""
+
+    SCHEMA_NAME: ClassVar[str] = "foxglove.CompressedImage"
+
+    timestamp: Stamp
+    """Middle of the exposure."""
+    frame_id: str
+    """The camera's name."""
+    data: bytes
+    format: str
+    """jpeg or png."""
 
 
 class SceneUpdate(msgspec.Struct, frozen=True, kw_only=True):
