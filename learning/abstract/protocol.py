@@ -1,14 +1,14 @@
 """The paper's protocol without physics, any number of switches, in the project's words: mastered, learnt, right."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from itertools import pairwise
 from statistics import fmean
 
 import msgspec
 import numpy as np
 
-from config.learning import LearningConfig
-from learning.abstract.learner import AbstractLearner
+from learning.abstract.learner import AbstractLearner, MakeAbstract
+from learning.abstract.oracle import OracleSubgoals
 from learning.abstract.rules import TRIALS, Rules, optimal_trials, reachable_states, situation
 from learning.abstract.table import AbstractTable, Skills, Things
 from learning.interfaces import SubgoalSelector
@@ -22,6 +22,7 @@ N_TESTS, N_ENOUGH = 20, 18
 LOOK_EVERY = 10
 """Epochs between looks at the graph."""
 N_LAST = 200
+HALF = 0.5
 
 
 class Era(msgspec.Struct, frozen=True, kw_only=True):
@@ -52,7 +53,7 @@ class Result(msgspec.Struct, frozen=True, kw_only=True):
 def run_abstract(
     *,
     seed: int,
-    config: LearningConfig,
+    learner: MakeAbstract,
     eras: Sequence[Rules],
     epochs: int = 1000,
     skills: Skills | None = None,
@@ -62,11 +63,9 @@ def run_abstract(
     first, second = np.random.default_rng(seed).spawn(2)
     n_goals = len(eras[0])
     table = AbstractTable(n_goals=n_goals, skills=skills or Skills(), rng=first, things=things)
-    learner = AbstractLearner(
-        n_goals=n_goals, goals=config.goal_selection, subgoals=config.subgoal_selection, rng=second
-    )
-    ended = [_run_era(table, learner, rules, n_before=i * epochs, epochs=epochs) for i, rules in enumerate(eras)]
-    return Result(eras=tuple(ended), table=table, learner=learner)
+    made = learner(n_goals, second)
+    ended = [_run_era(table, made, rules, n_before=i * epochs, epochs=epochs) for i, rules in enumerate(eras)]
+    return Result(eras=tuple(ended), table=table, learner=made)
 
 
 class _Evaluations:
@@ -88,7 +87,7 @@ def _run_era(table: AbstractTable, learner: AbstractLearner, rules: Rules, *, n_
     table.rules = rules
     rows: list[tuple[int, bool, int]] = []
     evaluations, wrong_until = _Evaluations(), 0
-    has_graph = isinstance(learner.selector, GraphSelector)
+    has_graph = _foretelling(learner.selector) is not None
     for i in range(1, epochs + 1):
         rows.append(learner.learn_epoch(table, n_before + i))
         evaluations.look(i, table, learner, n_before + i)
@@ -117,10 +116,26 @@ def _all_mastered(table: AbstractTable, learner: AbstractLearner, epoch: int) ->
 
 
 def is_graph_right(selector: SubgoalSelector, rules: Rules) -> bool:
-    """Whether the graph says the same as the rules of every goal in every goal-state that can be reached."""
-    assert isinstance(selector, GraphSelector)
+    """Whether the graph says the same as the rules of every goal in every goal-state that can be reached without it.
+
+    Where a goal is on it cannot be tried: what is needed there, nobody could find out.
+    """
+    chance = _foretelling(selector)
+    assert chance is not None
     return all(
-        (selector.graph.beliefs[g].predict_allowed(situation(state)) > 0.5) == rules[g].allow(situation(state))
+        (chance(g, state) > HALF) == needed.allow(situation(state))
         for state in reachable_states(rules)
-        for g in range(len(rules))
+        for g, needed in enumerate(rules)
+        if not state >> g & 1
     )
+
+
+def _foretelling(selector: SubgoalSelector) -> Callable[[int, int], float] | None:
+    """Return what says how probably a goal is allowed in a goal-state; None where nothing is believed of that."""
+    if isinstance(selector, GraphSelector):
+        beliefs = selector.graph.beliefs
+        return lambda goal, state: beliefs[goal].predict_allowed(situation(state))
+    if isinstance(selector, OracleSubgoals):
+        allowed = selector.oracle.allowed()
+        return lambda goal, state: allowed[goal, state]
+    return None

@@ -1,14 +1,25 @@
 """Rules of a table without physics: what each goal needs, which goal-states can come about, the fewest trials. Pure."""
 
 from collections.abc import Sequence
+from math import comb
 
 import numpy as np
 
 from learning.interfaces import GoalState
 from learning.planning import Effort, cheapest_plan
-from learning.preconditions import START, Needs, Situation
+from learning.preconditions import START, Needs, Situation, conjunctions
 
-__all__ = ["TRIALS", "Rules", "bits", "draw_rules", "needs", "optimal_trials", "reachable_states", "situation"]
+__all__ = [
+    "TRIALS",
+    "Rules",
+    "bits",
+    "chance_of_needs",
+    "draw_rules",
+    "needs",
+    "optimal_trials",
+    "reachable_states",
+    "situation",
+]
 
 Rules = tuple[Needs, ...]
 TRIALS = 8
@@ -61,6 +72,16 @@ def _draw_needs(rng: np.random.Generator, goal: int, n_goals: int, max_literals:
     members = rng.choice(others, size=int(rng.integers(0, max_literals + 1)), replace=False)
     is_on = rng.random(len(members)) < ON_SHARE
     return needs([int(i) for i in members[is_on]], [int(i) for i in members[~is_on]])
+
+
+def chance_of_needs(n_goals: int, goal: int, max_literals: int) -> dict[Needs, float]:
+    """Return how probable each need of a goal is as `draw_rules` draws it, before it leaves out what cannot be."""
+    chances: dict[Needs, float] = {}
+    for drawn in conjunctions(n_goals, goal, max_literals):
+        n_on, n_off = drawn.on.bit_count(), drawn.off.bit_count()
+        signs = ON_SHARE**n_on * (1.0 - ON_SHARE) ** n_off
+        chances[drawn] = signs / (max_literals + 1) / comb(n_goals - 1, n_on + n_off)
+    return chances
 
 
 def situation(state: int) -> Situation:

@@ -27,6 +27,10 @@ class Skills(msgspec.Struct, frozen=True, kw_only=True):
     drop: float = 0.0
     """Chance per trial that what the hand holds is dropped."""
 
+    def at(self, n_achieved: int) -> float:
+        """Return the chance of success where nothing blocks, after so many practised successes."""
+        return float(self.last - (self.last - self.first) * np.exp(-n_achieved / self.practice))
+
 
 class Things(msgspec.Struct, frozen=True, kw_only=True):
     """What the hand has to do with goals: none of them where left out."""
@@ -75,8 +79,7 @@ class AbstractTable:
 
     def skill(self, goal: int) -> float:
         """Return the chance of success where nothing blocks."""
-        rest = np.exp(-self._n_achieved[goal] / self._skills.practice)
-        return float(self._skills.last - (self._skills.last - self._skills.first) * rest)
+        return self._skills.at(self._n_achieved[goal])
 
     def _judge(self, p_blocked: float) -> TrialOutcome:
         return TrialOutcome.BLOCKED if self._rng.random() < p_blocked else TrialOutcome.NOT_REACHED
