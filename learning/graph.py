@@ -206,11 +206,13 @@ class Graph:
         return least
 
     def _shares(self) -> list[list[float]]:
-        """Return [i][j]: how often attempts at goal i came to the place while j held, over the same while it did not."""
-        if self._fair is None:
-            without, held = (self._reached + 2.0) / (self._tried + 2.0)  # (n, n), (n, n)
-            self._fair = (held / without).tolist()
-        return self._fair
+        """Return [i][j]: how often goal i's place was reached while j held, over the same while it did not."""
+        if self._fair is not None:
+            return self._fair
+        without, held = (self._reached + 2.0) / (self._tried + 2.0)  # (n, n), (n, n)
+        shares: list[list[float]] = (held / without).tolist()
+        self._fair = shares
+        return shares
 
     def undone(self, goal: int) -> int:
         """Return the goals, as a bit mask, that achieving a goal is taken to lose."""
