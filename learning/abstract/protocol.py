@@ -14,7 +14,7 @@ from learning.abstract.table import AbstractTable, Skills, Things
 from learning.interfaces import SubgoalSelector
 from learning.subgoal_graph import GraphSelector
 
-__all__ = ["Era", "Result", "is_graph_right", "run_abstract"]
+__all__ = ["Era", "Evaluations", "Result", "foretelling", "is_graph_right", "run_abstract"]
 
 DENSE_EVERY, DENSE_FOR, EVERY = 10, 150, 50
 """How judged runs evaluate."""
@@ -68,32 +68,41 @@ def run_abstract(
     return Result(eras=tuple(ended), table=table, learner=made)
 
 
-class _Evaluations:
-    """Whether all goals are mastered, evaluation by evaluation, until they are twice running."""
+class Evaluations:
+    """Whether all goals are mastered, evaluation by evaluation, until they are twice running.
 
-    def __init__(self) -> None:
+    Args:
+        goals: those that can be achieved.
+    """
+
+    def __init__(self, goals: Sequence[int]) -> None:
+        self._goals = goals
         self._at: list[tuple[int, bool]] = []
 
     @property
     def mastered(self) -> int | None:
+        """First of two evaluations running at which every goal was mastered, None where there was none."""
         return next((epoch for (epoch, is_one), (_, is_next) in pairwise(self._at) if is_one and is_next), None)
 
     def look(self, i: int, table: AbstractTable, learner: AbstractLearner, epoch: int) -> None:
+        """Evaluate after so many epochs of an era, where that is due."""
         if i % (DENSE_EVERY if i <= DENSE_FOR else EVERY) == 0 and self.mastered is None:
-            self._at.append((i, _all_mastered(table, learner, epoch)))
+            self._at.append((i, _all_mastered(table, learner, epoch, self._goals)))
 
 
 def _run_era(table: AbstractTable, learner: AbstractLearner, rules: Rules, *, n_before: int, epochs: int) -> Era:
     table.rules = rules
     rows: list[tuple[int, bool, int]] = []
-    evaluations, wrong_until = _Evaluations(), 0
-    has_graph = _foretelling(learner.selector) is not None
+    optimum = optimal_trials(rules)
+    evaluations = Evaluations([goal for goal, n_trials in enumerate(optimum) if n_trials < TRIALS])
+    wrong_until = 0
+    has_graph = foretelling(learner.selector) is not None
     for i in range(1, epochs + 1):
         rows.append(learner.learn_epoch(table, n_before + i))
         evaluations.look(i, table, learner, n_before + i)
         if has_graph and i % LOOK_EVERY == 0 and not is_graph_right(learner.selector, rules):
             wrong_until = i
-    last, optimum = rows[-N_LAST:], optimal_trials(rules)
+    last = rows[-N_LAST:]
     by_goal = [[(ok, n - optimum[goal]) for chosen, ok, n in last if chosen == goal] for goal in range(len(rules))]
     return Era(
         mastered=evaluations.mastered,
@@ -105,14 +114,9 @@ def _run_era(table: AbstractTable, learner: AbstractLearner, rules: Rules, *, n_
     )
 
 
-def _all_mastered(table: AbstractTable, learner: AbstractLearner, epoch: int) -> bool:
-    """Whether every goal that can be achieved is, often enough, learning off."""
-    optimum = optimal_trials(table.rules)
-    return all(
-        sum(learner.test_epoch(table, epoch, goal)[0] for _ in range(N_TESTS)) >= N_ENOUGH
-        for goal in range(learner.n_goals)
-        if optimum[goal] < TRIALS
-    )
+def _all_mastered(table: AbstractTable, learner: AbstractLearner, epoch: int, goals: Sequence[int]) -> bool:
+    """Whether every one of the goals is achieved often enough, learning off."""
+    return all(sum(learner.test_epoch(table, epoch, goal)[0] for _ in range(N_TESTS)) >= N_ENOUGH for goal in goals)
 
 
 def is_graph_right(selector: SubgoalSelector, rules: Rules) -> bool:
@@ -120,7 +124,7 @@ def is_graph_right(selector: SubgoalSelector, rules: Rules) -> bool:
 
     Where a goal is on it cannot be tried: what is needed there, nobody could find out.
     """
-    chance = _foretelling(selector)
+    chance = foretelling(selector)
     assert chance is not None
     return all(
         (chance(g, state) > HALF) == needed.allow(situation(state))
@@ -130,7 +134,7 @@ def is_graph_right(selector: SubgoalSelector, rules: Rules) -> bool:
     )
 
 
-def _foretelling(selector: SubgoalSelector) -> Callable[[int, int], float] | None:
+def foretelling(selector: SubgoalSelector) -> Callable[[int, int], float] | None:
     """Return what says how probably a goal is allowed in a goal-state; None where nothing is believed of that."""
     if isinstance(selector, GraphSelector):
         beliefs = selector.graph.beliefs

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from math import comb
+from typing import Protocol
 
 import numpy as np
 
@@ -11,17 +12,31 @@ from learning.preconditions import START, Needs, Situation, conjunctions
 
 __all__ = [
     "TRIALS",
+    "Permits",
+    "Rule",
     "Rules",
     "bits",
     "chance_of_needs",
     "draw_rules",
     "needs",
     "optimal_trials",
+    "permits",
     "reachable_states",
     "situation",
 ]
 
 Rules = tuple[Needs, ...]
+
+
+class Permits(Protocol):
+    """Needs that are no conjunction (learning/abstract/outside.py)."""
+
+    def permits(self, order: Sequence[int]) -> bool:
+        """Whether they are met after goals came about in this order."""
+        ...
+
+
+Rule = Needs | Permits
 TRIALS = 8
 """That an epoch has."""
 ON_SHARE = 0.6
@@ -33,6 +48,13 @@ ROOM = 3
 def needs(on: Sequence[int] = (), off: Sequence[int] = ()) -> Needs:
     """Return a conjunction from goal indices."""
     return Needs(sum(1 << i for i in on), sum(1 << i for i in off))
+
+
+def permits(rule: Rule, order: Sequence[int]) -> bool:
+    """Return whether a goal may come about after others did in this order."""
+    if isinstance(rule, Needs):
+        return rule.allow(situation(sum(1 << goal for goal in order)))
+    return rule.permits(order)
 
 
 def reachable_states(rules: Rules) -> set[int]:
