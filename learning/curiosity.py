@@ -40,11 +40,13 @@ def random_walks(
     start: Situation, graph: Graph, *, n_walks: int, length: int, rng: np.random.Generator
 ) -> Iterator[tuple[tuple[int, ...], Situation]]:
     """Yield goals achieved and situation reached, at each of less than length steps, over what is believed allowed."""
+    believed = [(i, graph.most_probable(i)) for i in range(graph.n_goals)]
     for _ in range(n_walks):
         steps, here = (), start
         while len(steps) < length:
             yield steps, here
-            ways = [i for i in range(graph.n_goals) if not here.latched >> i & 1 and graph.most_probable(i).allow(here)]
+            holds, latched = here
+            ways = [i for i, (on, off) in believed if not (latched >> i & 1 or on & ~holds or off & latched)]
             if not ways:
                 break
             step = ways[int(rng.integers(len(ways)))]

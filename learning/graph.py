@@ -65,6 +65,9 @@ class Graph:
         self._tried = np.zeros((2, n_goals, n_goals))
         self._reached = np.zeros((2, n_goals, n_goals))
         """[h, i, j]: of the attempts at goal i while goal j held (h = 1) or did not, how many came to the place."""
+        self._fair: list[list[float]] | None = None
+        self._undone: list[int] | None = None
+        """What was worked out of these counts already."""
         self._revisions = Revisions(self.beliefs)
         self._log = tuple(deque[Evidence](maxlen=N_EVIDENCE) for _ in range(n_goals))
         self._last: list[Evidence | None] = [None] * n_goals
@@ -126,6 +129,7 @@ class Graph:
         """Count which goals held before a goal was achieved, and which of them it lost."""
         if attempt.holds is None or attempt.holds_after is None:
             return
+        self._undone = None
         for k, (held, holds) in enumerate(zip(attempt.holds, attempt.holds_after, strict=True)):
             if held and k != attempt.subgoal:
                 at = (attempt.subgoal, k)
@@ -135,6 +139,7 @@ class Graph:
     def _count_reached(self, attempt: Attempt) -> None:
         """Count whether an attempt came to its place, whatever it came to there, by what held meanwhile."""
         tried, holds = attempt.subgoal, situation_of(attempt).holds
+        self._fair = None
         is_reached = attempt.outcome is not TrialOutcome.NOT_REACHED
         for j in range(self.n_goals):
             at = (holds >> j & 1, tried, j)
@@ -193,13 +198,27 @@ class Graph:
         is little to be found out by it. It is the least, over goals that hold, of the share of attempts that came to
         the place while that one held, over the same while it did not; (reached + 2) / (tried + 2), so at first 1.
         """
-        without, held = (self._reached[:, goal] + 2.0) / (self._tried[:, goal] + 2.0)  # (n,), (n,)
-        shares = [held[j] / without[j] for j in range(self.n_goals) if situation.holds >> j & 1]
-        return float(min([1.0, *shares]))
+        shares, holds, least = self._shares()[goal], situation.holds, 1.0
+        while holds:
+            bit = holds & -holds
+            holds ^= bit
+            least = min(least, shares[bit.bit_length() - 1])
+        return least
+
+    def _shares(self) -> list[list[float]]:
+        """Return [i][j]: how often goal i's place was reached while j held, over the same while it did not."""
+        if self._fair is not None:
+            return self._fair
+        without, held = (self._reached + 2.0) / (self._tried + 2.0)  # (n, n), (n, n)
+        shares: list[list[float]] = (held / without).tolist()
+        self._fair = shares
+        return shares
 
     def undone(self, goal: int) -> int:
         """Return the goals, as a bit mask, that achieving a goal is taken to lose."""
-        return sum(1 << k for k, loss in enumerate(self.losses()[goal]) if loss >= 0.5)
+        if self._undone is None:
+            self._undone = [sum(1 << k for k, loss in enumerate(row) if loss >= 0.5) for row in self.losses().tolist()]
+        return self._undone[goal]
 
     def is_known(self, goal: int, start: Situation) -> bool:
         """Whether there is a plan at whose end the goal is more probably allowed than not."""
@@ -257,6 +276,7 @@ class Graph:
         self._lost = np.array(state["lost"], dtype=float)
         self._tried = np.array(state["tried"], dtype=float)
         self._reached = np.array(state["reached"], dtype=float)
+        self._fair = self._undone = None
         self._revisions.load_state_dict(state["revisions"])
         for kept, loaded in zip(self._log, state["log"], strict=True):
             kept.clear()

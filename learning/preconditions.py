@@ -11,6 +11,8 @@ from typing import Any, NamedTuple
 import msgspec
 import numpy as np
 
+from learning.one_change import OneChange, one_change
+
 __all__ = ["START", "Belief", "Evidence", "Kind", "Needs", "Situation", "conjunctions", "mask", "one_change_apart"]
 
 
@@ -28,6 +30,11 @@ class Situation(NamedTuple):
 
 
 START = Situation(0, 0)
+WORD = 31
+"""Bits of a word for what must be on; as many for what must be off lie above them."""
+MOST = (1 << WORD) - 1
+MOST_KEPT = 4096
+"""Predictions that are kept until a belief changes."""
 
 
 class Needs(NamedTuple):
@@ -120,7 +127,8 @@ class Belief:
         n_literals = np.array([(c.on | c.off).bit_count() for c in needs])
         weights = np.exp(-literal_cost * n_literals)
         self._prior = weights / weights.sum()
-        self._changes, self._n_changes = _changes(needs, n_goals, goal, max_literals)  # (h, most), (h,)
+        self._words = self._on | self._off << WORD  # (h,)
+        self._one_change = _one_change(needs, n_goals, goal, max_literals)
         self._n_goals = n_goals
         self._false_positive = false_positive
         self._hits = np.zeros(len(needs))  # (h,)
@@ -129,7 +137,8 @@ class Belief:
 
     def allows(self, situation: Situation) -> np.ndarray:
         """Return which conjunctions allow the goal in a situation.  () -> (h,)"""
-        return ((self._on & ~situation.holds) | (self._off & situation.latched)) == 0
+        missing = ~situation.holds & MOST | situation.latched << WORD
+        return (self._words & missing) == 0
 
     def _provides(self, situation: Situation) -> np.ndarray:
         """Return in which conjunctions all that must be on is on.  () -> (h,)"""
@@ -143,6 +152,10 @@ class Belief:
         """The most probable conjunction, of fewest literals among equals."""
         self.confidence = float(probabilities[best])
         """Its probability."""
+        self._predicted: dict[Situation, float] = {}
+        self._marginals: tuple[tuple[float, float], ...] | None = None
+        self._is_hit: bool | None = None
+        """What was worked out already of these probabilities and records."""
 
     def expect_change(self, hazard: float, *, local: float = 0.0) -> None:
         """Take the needs to have changed.
@@ -151,18 +164,15 @@ class Belief:
             hazard: chance that they did.
             local: share of the changes that are of one literal; the others draw from the prior.
         """
-        leaving = hazard * local * self.probabilities / self._n_changes  # (h,)
-        changed = self._arriving(leaving)
+        leaving = hazard * local * self.probabilities / self._one_change.n_changes  # (h,)
+        arriving = self._one_change.arriving
+        changed = arriving(leaving)
         kept = (1.0 - hazard) * self.probabilities
         mixed = kept + changed + hazard * (1.0 - local) * self._prior
         for record in (self._hits, self._misses):
-            brought = kept * record + self._arriving(leaving * record)
+            brought = kept * record + arriving(leaving * record)
             np.divide(brought, mixed, out=record, where=mixed > 0.0)
         self._believe(mixed / mixed.sum())
-
-    def _arriving(self, leaving: np.ndarray) -> np.ndarray:
-        """Return what comes to each conjunction from those one change apart, which each send so much.  (h,) -> (h,)"""
-        return np.append(leaving, 0.0)[self._changes].sum(axis=1)
 
     def update(self, evidence: Evidence, *, block_hit: float, weight: float = 1.0) -> float:
         """Apply Bayes' rule to one attempt and return the chance that had been given to its result.
@@ -191,6 +201,7 @@ class Belief:
         posterior = self.probabilities * factors**weight
         self._believe(posterior / posterior.sum())
         self._record(evidence.kind, ever_allowed.mean(axis=0), weight)
+        self._is_hit = None
         return expected
 
     def _record(self, kind: Kind, allowed: np.ndarray, weight: float) -> None:
@@ -218,7 +229,11 @@ class Belief:
 
     def predict_allowed(self, situation: Situation) -> float:
         """Return the probability that the goal is allowed in a situation."""
-        return float(self.probabilities @ self.allows(situation))
+        if situation not in self._predicted:
+            if len(self._predicted) >= MOST_KEPT:
+                self._predicted.clear()
+            self._predicted[situation] = float(self.probabilities @ self.allows(situation))
+        return self._predicted[situation]
 
     def predict_success(self, situation: Situation) -> float:
         """Return the chance of success in a situation: that the goal is allowed, and the skill where it is.
@@ -236,10 +251,17 @@ class Belief:
     @property
     def was_achieved(self) -> bool:
         """Whether the goal was ever achieved."""
-        return bool(self._hits.any())
+        if self._is_hit is None:
+            self._is_hit = bool(self._hits.any())
+        return self._is_hit
 
     def marginals(self) -> tuple[tuple[float, float], ...]:
         """Return for each goal the probability that it must be on, and that it must be off."""
+        if self._marginals is None:
+            self._marginals = self._work_out_marginals()
+        return self._marginals
+
+    def _work_out_marginals(self) -> tuple[tuple[float, float], ...]:
         bits = 1 << np.arange(self._n_goals, dtype=np.int64)
         on = self.probabilities @ ((self._on[:, None] & bits) != 0)  # (h,) @ (h, n) -> (n,)
         off = self.probabilities @ ((self._off[:, None] & bits) != 0)
@@ -257,17 +279,18 @@ class Belief:
 
     def load_state_dict(self, state: dict[str, Any]) -> None:
         """Restore bit for bit."""
-        self._believe(np.array(state["probabilities"], dtype=float))
         self._hits, self._misses = np.array(state["hits"], dtype=float), np.array(state["misses"], dtype=float)
+        self._believe(np.array(state["probabilities"], dtype=float))
 
 
-def _changes(needs: Sequence[Needs], n_goals: int, goal: int, max_literals: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return the indices of all conjunctions one change apart from each, padded with their number, and how many."""
+def _one_change(needs: Sequence[Needs], n_goals: int, goal: int, max_literals: int) -> OneChange:
+    """Return the sums over what is one change apart."""
     index_of = {conjunction: i for i, conjunction in enumerate(needs)}
-    apart = [[index_of[n] for n in one_change_apart(c, n_goals, goal, max_literals)] for c in needs]
-    most = max(1, max(map(len, apart)))
-    padded = np.array([row + [len(needs)] * (most - len(row)) for row in apart], dtype=np.int64)
-    return padded, np.array([max(1, len(row)) for row in apart])
+    return one_change(
+        needs,
+        lambda i: [index_of[n] for n in one_change_apart(needs[i], n_goals, goal, max_literals)],
+        n_others=n_goals - 1, max_literals=max_literals,
+    )  # fmt: skip
 
 
 def _ever(allowed: np.ndarray, readings: Sequence[Situation]) -> np.ndarray:

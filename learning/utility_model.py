@@ -13,7 +13,6 @@ from typing import Any
 
 import numpy as np
 import torch
-from torch.nn.functional import smooth_l1_loss
 
 from config.learning import Expert as ExpertConfig
 from learning.networks import Network
@@ -32,6 +31,8 @@ FLOOR_STD_M = 0.006
 WINDOW = 20
 """Trials of the running success."""
 LOSS_BEND = 0.1
+EACH = 0
+"""As torch numbers its reductions: none."""
 RETRAINED = 10
 """Trials' worth of training with new weights, once a model is past its first successes."""
 
@@ -173,13 +174,15 @@ class UtilityModel:
         counts for more, so that detours fade.
         """
         x, y, n_failed = self._batch()
-        u = self._network.model(torch.from_numpy(x))[:, 0]
-        wanted = torch.from_numpy(y)
-        tau = self._config.expectile
-        weight = torch.where(wanted > u, 2.0 * tau, 2.0 * (1.0 - tau))
-        if n_failed:
-            weight[-n_failed:] = 1.0
-        self._network.descend((weight * smooth_l1_loss(u, wanted, beta=LOSS_BEND, reduction="none")).mean())
+        wanted, tau = torch.from_numpy(y), self._config.expectile
+
+        def slope(u: torch.Tensor) -> torch.Tensor:
+            weight = torch.where(wanted > u, 2.0 * tau, 2.0 * (1.0 - tau))
+            if n_failed:
+                weight[-n_failed:] = 1.0
+            return torch.ops.aten.smooth_l1_loss_backward(weight / len(u), u, wanted, EACH, LOSS_BEND)
+
+        self._network.descend_by(x, slope)
 
     def _batch(self) -> tuple[Array, Array, int]:
         """Return inputs, utilities and how many of the last rows are failures."""

@@ -11,11 +11,13 @@ import numpy as np
 from rich.console import Console
 from rich.progress import track
 
-from config.learning import LearningConfig
 from config.loader import load_learning
 from config.sources import shipped_names
+from learning.abstract.learner import as_config_says, as_oracle
+from learning.abstract.oracle import Told
 from learning.abstract.protocol import Era, run_abstract
 from learning.abstract.rules import draw_rules
+from learning.abstract.table import Skills
 from robot.bench import BenchReport, BenchResult, bench_report
 from robot.parent import end_with_parent
 
@@ -26,13 +28,15 @@ FIRST_SEED = 400
 FEW, MANY = 2, 20
 N_GOALS, N_LITERALS, N_SWITCHES, ERA_EPOCHS = 6, 2, 2, 300
 LEARN_GOAL, RECOVER_GOAL = 150, 100
+ORACLE = "oracle"
+"""Beside the presets: what could be had by who knows how rules are drawn."""
 
 
 def bench_baselines(*, full: bool) -> BenchReport:
     """Learn rules drawn at random, with switches, by every shipped preset; full takes 20 seeds and not 2."""
     begin = perf_counter()
     seeds = range(FIRST_SEED, FIRST_SEED + (MANY if full else FEW))
-    presets = tuple(_different_presets())
+    presets = (*_different_presets(), ORACLE)
     cells = [(name, seed) for name in presets for seed in seeds]
     with ProcessPoolExecutor(mp_context=get_context("spawn"), initializer=end_with_parent) as pool:
         ran = pool.map(_eras, *zip(*cells, strict=True))
@@ -55,11 +59,12 @@ def _different_presets() -> Iterator[str]:
 
 def _eras(name: str, seed: int) -> tuple[Era, ...]:
     """Run one learner under rules that its seed alone draws: all learn the same."""
-    config: LearningConfig = load_learning(name)
+    told = Told(n_goals=N_GOALS, max_literals=N_LITERALS, hazard=1.0 / ERA_EPOCHS, skills=Skills())
+    learner = as_oracle(told) if name == ORACLE else as_config_says(load_learning(name))
     rng = np.random.default_rng([seed, N_GOALS])
     draw = partial(draw_rules, rng, N_GOALS, max_literals=N_LITERALS)
     eras = tuple(draw() for _ in range(1 + N_SWITCHES))
-    return run_abstract(seed=seed, config=config, eras=eras, epochs=ERA_EPOCHS).eras
+    return run_abstract(seed=seed, learner=learner, eras=eras, epochs=ERA_EPOCHS).eras
 
 
 def _rows(name: str, runs: list[tuple[Era, ...]]) -> tuple[BenchResult, ...]:

@@ -1,17 +1,19 @@
 """The bench of the upper layers without physics: drawn rules, switches, many goals, and what a decision takes."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from statistics import median
 from time import perf_counter
 
 import numpy as np
+from msgspec.structs import replace
 from rich.console import Console
 from rich.progress import track
 
 from config.learning import LearningConfig
 from config.loader import load_learning
-from learning.abstract.learner import AbstractLearner
-from learning.abstract.protocol import Era, Result, run_abstract
+from learning.abstract.learner import AbstractLearner, MakeAbstract, as_config_says, as_oracle
+from learning.abstract.oracle import Told
+from learning.abstract.protocol import Era, run_abstract
 from learning.abstract.rules import Rules, draw_rules
 from learning.abstract.table import AbstractTable, Skills
 from robot.bench import BenchReport, BenchResult, bench_report
@@ -33,13 +35,13 @@ DECISION_GOALS, DECISION_EPOCHS, DECISION_GOAL_MS = (6, 12, 24), 40, 5.0
 
 
 def bench_abstract(*, full: bool) -> BenchReport:
-    """Learn rules drawn at random by the default preset; full takes 20 seeds of each row and not 2."""
+    """Learn drawn rules by the default preset and by the oracle; full takes 20 seeds of each row and not 2."""
     begin = perf_counter()
     config = load_learning("default")
     seeds = range(FIRST_SEED, FIRST_SEED + (MANY if full else FEW))
     results = (
-        *_switch_rows(config, seeds),
-        *_many_goals_rows(config, seeds),
+        *_beside_the_oracle(_switch_rows, config, seeds, n_goals=N_GOALS),
+        *_beside_the_oracle(_many_goals_rows, config, seeds, n_goals=N_MANY_GOALS),
         _steady_row(config),
         _speed_row(config),
         *(_decision_row(config, n_goals) for n_goals in DECISION_GOALS),
@@ -52,12 +54,26 @@ def _drawn(seed: int, n_goals: int, n_eras: int) -> tuple[Rules, ...]:
     return tuple(draw_rules(rng, n_goals, max_literals=N_LITERALS) for _ in range(n_eras))
 
 
-def _run(config: LearningConfig, seed: int, n_goals: int, n_eras: int) -> Result:
-    return run_abstract(seed=seed, config=config, eras=_drawn(seed, n_goals, n_eras), epochs=ERA_EPOCHS)
+def _beside_the_oracle(
+    rows: Callable[[MakeAbstract, Sequence[int]], tuple[BenchResult, ...]],
+    config: LearningConfig,
+    seeds: Sequence[int],
+    *,
+    n_goals: int,
+) -> Iterator[BenchResult]:
+    """Yield the learner's rows, each before the oracle's, of which nothing is asked."""
+    told = Told(n_goals=n_goals, max_literals=N_LITERALS, hazard=1.0 / ERA_EPOCHS, skills=Skills())
+    for row, best in zip(rows(as_config_says(config), seeds), rows(as_oracle(told), seeds), strict=True):
+        yield row
+        yield replace(best, name=f"oracle_{best.name}", goal="", ok=True)
 
 
-def _switch_rows(config: LearningConfig, seeds: Sequence[int]) -> tuple[BenchResult, ...]:
-    runs = [_run(config, seed, N_GOALS, 1 + N_SWITCHES).eras for seed in _shown(seeds, "six goals, five switches")]
+def _run(learner: MakeAbstract, seed: int, n_goals: int, n_eras: int) -> tuple[Era, ...]:
+    return run_abstract(seed=seed, learner=learner, eras=_drawn(seed, n_goals, n_eras), epochs=ERA_EPOCHS).eras
+
+
+def _switch_rows(learner: MakeAbstract, seeds: Sequence[int]) -> tuple[BenchResult, ...]:
+    runs = [_run(learner, seed, N_GOALS, 1 + N_SWITCHES) for seed in _shown(seeds, "six goals, five switches")]
     laters = [eras[1:] for eras in runs]
     return (
         _share("learnt_share", [_is_within(eras[0].mastered, LEARN_GOAL) for eras in runs], ENOUGH_SHARE),
@@ -75,8 +91,8 @@ def _switch_rows(config: LearningConfig, seeds: Sequence[int]) -> tuple[BenchRes
     )  # fmt: skip
 
 
-def _many_goals_rows(config: LearningConfig, seeds: Sequence[int]) -> tuple[BenchResult, ...]:
-    eras: list[Era] = [_run(config, seed, N_MANY_GOALS, 1).eras[0] for seed in _shown(seeds, "twelve goals")]
+def _many_goals_rows(learner: MakeAbstract, seeds: Sequence[int]) -> tuple[BenchResult, ...]:
+    eras = [_run(learner, seed, N_MANY_GOALS, 1)[0] for seed in _shown(seeds, "twelve goals")]
     return (
         _share("twelve_goals_mastered_share", [_is_within(era.mastered, ERA_EPOCHS) for era in eras], ENOUGH_MANY),
         _middle("twelve_goals_mastered_after", [era.mastered for era in eras]),
@@ -132,10 +148,7 @@ def _made(config: LearningConfig, rules: Rules, skills: Skills) -> tuple[Abstrac
     first, second = np.random.default_rng(FIRST_SEED).spawn(2)
     table = AbstractTable(n_goals=len(rules), skills=skills, rng=first)
     table.rules = rules
-    learner = AbstractLearner(
-        n_goals=len(rules), goals=config.goal_selection, subgoals=config.subgoal_selection, rng=second
-    )
-    return table, learner
+    return table, as_config_says(config)(len(rules), second)
 
 
 def _shown(seeds: Sequence[int], what: str) -> Iterable[int]:

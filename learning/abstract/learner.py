@@ -1,19 +1,23 @@
 """The upper layers as the agent runs them, on a table without physics."""
 
+from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
 
-from config.learning import GoalSelection, SubgoalSelection
+from config.learning import LearningConfig
+from learning.abstract.oracle import Oracle, OracleGoals, OracleSubgoals, Told
 from learning.abstract.rules import TRIALS
 from learning.abstract.table import AbstractTable
+from learning.agent import GoalSelector as ChoosesGoals
 from learning.goal_selector import GoalSelector
 from learning.graph import Graph
 from learning.interfaces import Attempt, SubgoalSelector, TrialOutcome
 from learning.subgoal_graph import GraphSelector
 from learning.subgoal_selector import make_subgoal_selector
 
-__all__ = ["AbstractLearner"]
+__all__ = ["AbstractLearner", "MakeAbstract", "as_config_says", "as_oracle"]
 
 WINDOW = 20
 """Newest trials of a skill that its chance is told from."""
@@ -22,13 +26,10 @@ WINDOW = 20
 class AbstractLearner:
     """The upper layers as the agent runs them."""
 
-    def __init__(
-        self, *, n_goals: int, goals: GoalSelection, subgoals: SubgoalSelection, rng: np.random.Generator
-    ) -> None:
-        first, second = rng.spawn(2)
+    def __init__(self, *, n_goals: int, goal_selector: ChoosesGoals, selector: SubgoalSelector) -> None:
         self.n_goals = n_goals
-        self.goal_selector = GoalSelector(n_goals=n_goals, config=goals, subgoals=subgoals, rng=first)
-        self.selector: SubgoalSelector = make_subgoal_selector(n_goals=n_goals, config=subgoals, rng=second)
+        self.goal_selector = goal_selector
+        self.selector = selector
         self._outcomes: list[list[bool]] = [[] for _ in range(n_goals)]
 
     def learn_epoch(self, table: AbstractTable, epoch: int) -> tuple[int, bool, int]:
@@ -96,3 +97,34 @@ class AbstractLearner:
     def _skill(self, goal: int) -> float:
         newest = self._outcomes[goal][-WINDOW:]
         return (sum(newest) + 1) / (len(newest) + 2)
+
+
+MakeAbstract = Callable[[int, np.random.Generator], AbstractLearner]
+"""Makes a learner for so many goals that draws from a generator."""
+
+
+def as_config_says(config: LearningConfig) -> MakeAbstract:
+    """Return what makes learners with the upper layers of a config."""
+    return partial(_configured, config)
+
+
+def as_oracle(told: Told) -> MakeAbstract:
+    """Return what makes oracles that are told so much."""
+    return partial(_all_knowing, told)
+
+
+def _configured(config: LearningConfig, n_goals: int, rng: np.random.Generator) -> AbstractLearner:
+    first, second = rng.spawn(2)
+    goals, subgoals = config.goal_selection, config.subgoal_selection
+    return AbstractLearner(
+        n_goals=n_goals,
+        goal_selector=GoalSelector(n_goals=n_goals, config=goals, subgoals=subgoals, rng=first),
+        selector=make_subgoal_selector(n_goals=n_goals, config=subgoals, rng=second),
+    )
+
+
+def _all_knowing(told: Told, n_goals: int, rng: np.random.Generator) -> AbstractLearner:
+    if n_goals != told.n_goals:
+        raise ValueError(f"expected the {told.n_goals} goals that the oracle was told of, got {n_goals}")
+    oracle = Oracle(told)
+    return AbstractLearner(n_goals=n_goals, goal_selector=OracleGoals(oracle, rng=rng), selector=OracleSubgoals(oracle))

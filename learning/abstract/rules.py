@@ -1,16 +1,42 @@
 """Rules of a table without physics: what each goal needs, which goal-states can come about, the fewest trials. Pure."""
 
 from collections.abc import Sequence
+from math import comb
+from typing import Protocol
 
 import numpy as np
 
 from learning.interfaces import GoalState
 from learning.planning import Effort, cheapest_plan
-from learning.preconditions import START, Needs, Situation
+from learning.preconditions import START, Needs, Situation, conjunctions
 
-__all__ = ["TRIALS", "Rules", "bits", "draw_rules", "needs", "optimal_trials", "reachable_states", "situation"]
+__all__ = [
+    "TRIALS",
+    "Permits",
+    "Rule",
+    "Rules",
+    "bits",
+    "chance_of_needs",
+    "draw_rules",
+    "needs",
+    "optimal_trials",
+    "permits",
+    "reachable_states",
+    "situation",
+]
 
 Rules = tuple[Needs, ...]
+
+
+class Permits(Protocol):
+    """Needs that are no conjunction (learning/abstract/outside.py)."""
+
+    def permits(self, order: Sequence[int]) -> bool:
+        """Whether they are met after goals came about in this order."""
+        ...
+
+
+Rule = Needs | Permits
 TRIALS = 8
 """That an epoch has."""
 ON_SHARE = 0.6
@@ -22,6 +48,13 @@ ROOM = 3
 def needs(on: Sequence[int] = (), off: Sequence[int] = ()) -> Needs:
     """Return a conjunction from goal indices."""
     return Needs(sum(1 << i for i in on), sum(1 << i for i in off))
+
+
+def permits(rule: Rule, order: Sequence[int]) -> bool:
+    """Return whether a goal may come about after others did in this order."""
+    if isinstance(rule, Needs):
+        return rule.allow(situation(sum(1 << goal for goal in order)))
+    return rule.permits(order)
 
 
 def reachable_states(rules: Rules) -> set[int]:
@@ -61,6 +94,16 @@ def _draw_needs(rng: np.random.Generator, goal: int, n_goals: int, max_literals:
     members = rng.choice(others, size=int(rng.integers(0, max_literals + 1)), replace=False)
     is_on = rng.random(len(members)) < ON_SHARE
     return needs([int(i) for i in members[is_on]], [int(i) for i in members[~is_on]])
+
+
+def chance_of_needs(n_goals: int, goal: int, max_literals: int) -> dict[Needs, float]:
+    """Return how probable each need of a goal is as `draw_rules` draws it, before it leaves out what cannot be."""
+    chances: dict[Needs, float] = {}
+    for drawn in conjunctions(n_goals, goal, max_literals):
+        n_on, n_off = drawn.on.bit_count(), drawn.off.bit_count()
+        signs = ON_SHARE**n_on * (1.0 - ON_SHARE) ** n_off
+        chances[drawn] = signs / (max_literals + 1) / comb(n_goals - 1, n_on + n_off)
+    return chances
 
 
 def situation(state: int) -> Situation:

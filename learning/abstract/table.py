@@ -1,9 +1,11 @@
 """A table without physics: rules in force, and experts that are chances of success."""
 
+from collections.abc import Sequence
+
 import msgspec
 import numpy as np
 
-from learning.abstract.rules import Rules, bits, needs, situation
+from learning.abstract.rules import Rule, needs, permits
 from learning.interfaces import GoalState, TrialOutcome
 
 __all__ = ["AbstractTable", "Skills", "Things"]
@@ -27,6 +29,10 @@ class Skills(msgspec.Struct, frozen=True, kw_only=True):
     drop: float = 0.0
     """Chance per trial that what the hand holds is dropped."""
 
+    def at(self, n_achieved: int) -> float:
+        """Return the chance of success where nothing blocks, after so many practised successes."""
+        return float(self.last - (self.last - self.first) * np.exp(-n_achieved / self.practice))
+
 
 class Things(msgspec.Struct, frozen=True, kw_only=True):
     """What the hand has to do with goals: none of them where left out."""
@@ -46,12 +52,15 @@ class AbstractTable:
         things = things or Things()
         self._grabs, self._carried = things.grabs, dict(things.carried)
         self._n_achieved = [0] * n_goals
-        self.rules: Rules = (needs(),) * n_goals
+        self.rules: Sequence[Rule] = (needs(),) * n_goals
         self.latched = self.holds = (False,) * n_goals
+        self._order: tuple[int, ...] = ()
+        """Goals in the order in which they came about."""
 
     def reset(self) -> None:
         """Lay the table out anew."""
         self.latched = self.holds = (False,) * self.n_goals
+        self._order = ()
 
     def attempt(self, goal: int, *, practise: bool) -> TrialOutcome:
         """Let the expert of a goal try, and return how the trial is judged."""
@@ -75,8 +84,7 @@ class AbstractTable:
 
     def skill(self, goal: int) -> float:
         """Return the chance of success where nothing blocks."""
-        rest = np.exp(-self._n_achieved[goal] / self._skills.practice)
-        return float(self._skills.last - (self._skills.last - self._skills.first) * rest)
+        return self._skills.at(self._n_achieved[goal])
 
     def _judge(self, p_blocked: float) -> TrialOutcome:
         return TrialOutcome.BLOCKED if self._rng.random() < p_blocked else TrialOutcome.NOT_REACHED
@@ -84,11 +92,13 @@ class AbstractTable:
     def _allows(self, goal: int) -> bool:
         """Whether the needs are met; what must be carried must be held now."""
         thing = self._carried.get(goal)
-        return self.rules[goal].allow(situation(bits(self.latched))) and (thing is None or self.holds[thing])
+        return permits(self.rules[goal], self._order) and (thing is None or self.holds[thing])
 
     def _achieve(self, goal: int) -> None:
         if goal in self._grabs or goal in self._carried:
             self._let_go()
+        if not self.latched[goal]:
+            self._order = (*self._order, goal)
         self.latched = _with(self.latched, goal, is_on=True)
         self.holds = _with(self.holds, goal, is_on=True)
 

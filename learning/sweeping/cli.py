@@ -1,4 +1,4 @@
-"""`autotelic sweep FILE`: many runs as one job, on this machine. The edge: terminal, files and the host's clock."""
+"""`autotelic sweep FILE`: many runs as one job, here or on a cluster. The edge: terminal, files and host clock."""
 
 import os
 from contextlib import AbstractContextManager, nullcontext
@@ -22,6 +22,7 @@ from learning.sweeping.cells import is_finished
 from learning.sweeping.executor import Executor
 from learning.sweeping.local import LocalExecutor
 from learning.sweeping.manifest import take_folder
+from learning.sweeping.on_ray import RayExecutor
 from learning.sweeping.runner import SweepRunner
 from learning.sweeping.table import Pace, sweep_table
 from learning.telling import report_tables
@@ -30,6 +31,7 @@ from robot.stop_request import StopRequest
 __all__ = ["sweep"]
 
 EXIT_FAILED, EXIT_USAGE, EXIT_INTERRUPTED = 1, 2, 130
+HERE, RAY = "here", "ray"
 LOOK_S = 0.2
 A_SECOND = 2
 
@@ -38,6 +40,10 @@ def sweep(
     file: Annotated[str, typer.Argument(help="Shipped sweep or a file.")],
     out: Annotated[Path | None, typer.Option(help="Folder of the sweep.  [default: runs/sweep-NAME]")] = None,
     jobs: Annotated[int | None, typer.Option(min=1, help="Cells at a time.  [default: one a processor]")] = None,
+    on: Annotated[
+        str,
+        typer.Option(help="Who runs cells: `here`, `ray` (a Ray of this machine's own), or `ray:ADDRESS`, a cluster."),
+    ] = "here",
     *,
     json: Annotated[bool, typer.Option("--json", help="Print the merged figures of merit as one JSON object.")] = False,
 ) -> None:
@@ -50,10 +56,11 @@ def sweep(
     try:
         wanted = load_sweep(file)
         n_epochs = _check(wanted)
+        name = _checked_name(on)
         folder = RunFolder(out or Path("runs") / f"sweep-{wanted.name}")
         with folder:
-            executor = LocalExecutor(n_slots=jobs or len(os.sched_getaffinity(0)), logs=folder.path / "logs")
-            runner = _run(wanted, folder.path, executor, n_epochs=n_epochs)
+            executor = _executor(name, jobs, folder.path / "logs")
+            runner = _run(wanted, folder.path.absolute(), executor, n_epochs=n_epochs)
             _end(runner, json=json)
     except (ConfigError, LearningError) as error:
         typer.echo(f"error: {error}", err=True)
@@ -74,6 +81,24 @@ def _check(wanted: Sweep) -> int:
             for preset in wanted.presets:
                 resolve(rig=rig, scenario=scenario, learning=preset)
     return wanted.epochs or max(load_learning(preset).experiment.epochs for preset in wanted.presets)
+
+
+def _checked_name(on: str) -> str:
+    if on not in (HERE, RAY) and not (on.startswith(f"{RAY}:") and on != f"{RAY}:"):
+        raise typer.BadParameter(f"expected {HERE}, {RAY} or {RAY}:ADDRESS, got {on}", param_hint="--on")
+    return on
+
+
+def _executor(on: str, jobs: int | None, logs: Path) -> Executor:
+    """Return who runs cells.
+
+    Raises:
+        LearningError: there is no such cluster, or Ray is not installed.
+    """
+    if on == HERE:
+        return LocalExecutor(n_slots=jobs or len(os.sched_getaffinity(0)), logs=logs)
+    _, _, address = on.partition(":")
+    return RayExecutor(address=address or None, n_slots=jobs, logs=logs)
 
 
 def _run(wanted: Sweep, folder: Path, executor: Executor, *, n_epochs: int) -> SweepRunner:

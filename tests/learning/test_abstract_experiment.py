@@ -10,7 +10,7 @@ import pytest
 
 from config.learning import LearningConfig
 from config.loader import load_learning
-from learning.abstract.learner import AbstractLearner
+from learning.abstract.learner import as_config_says
 from learning.abstract.protocol import is_graph_right, run_abstract
 from learning.abstract.rules import draw_rules, needs, reachable_states
 from learning.abstract.table import AbstractTable, Skills, Things
@@ -29,7 +29,9 @@ def default() -> LearningConfig:
 
 
 def run(config, seed, *, before=PAPER_BEFORE, after=PAPER_AFTER, epochs=300, things=PAPER_THINGS, skills=None):
-    return run_abstract(seed=seed, config=config, eras=(before, after), epochs=epochs, things=things, skills=skills)
+    return run_abstract(
+        seed=seed, learner=as_config_says(config), eras=(before, after), epochs=epochs, things=things, skills=skills
+    )
 
 
 def learnt(result):
@@ -186,5 +188,4 @@ def test_all_reporting_seeds_hold_what_the_default_preset_promises(default):
 def _table_and_learner(config, rng):
     first, second = rng.spawn(2)
     table = AbstractTable(n_goals=6, skills=Skills(), rng=first, things=PAPER_THINGS)
-    learner = AbstractLearner(n_goals=6, goals=config.goal_selection, subgoals=config.subgoal_selection, rng=second)
-    return table, learner
+    return table, as_config_says(config)(6, second)

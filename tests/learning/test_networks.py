@@ -76,3 +76,18 @@ def test_learning_starts_without_torchs_compiler():
         "sys.exit('torch._dynamo' in sys.modules)"
     )
     assert subprocess.run([sys.executable, "-c", program], check=False).returncode == 0
+
+
+def test_a_descent_by_a_slope_is_autograds_bit_for_bit(lesson):
+    x, y = lesson
+    made, twin = (Network((3, 8, 8, 1), learning_rate=0.01, rng=np.random.default_rng(3)) for _ in range(2))
+    for _ in range(20):
+        u = twin.model(x)[:, 0]
+        twin.descend(torch.nn.functional.smooth_l1_loss(u, y[:, 0], beta=0.1))
+
+        def slope(u):
+            return torch.ops.aten.smooth_l1_loss_backward(torch.ones(len(u)) / len(u), u, y[:, 0], 0, 0.1)
+
+        made.descend_by(x.numpy(), slope)
+    for one, other in zip(made.model.parameters(), twin.model.parameters(), strict=True):
+        assert torch.equal(one, other)
