@@ -20,7 +20,7 @@ class Shown:
     """
 
     def __init__(self, writes: Writes, picture: Picture) -> None:
-        self._writes, self._picture = writes, picture
+        self._writer, self._picture = writes, picture
         self._due_ns = 0
 
     def perceived(self, percept: Percept, state: ArmState | None, *, log_ns: int) -> None:
@@ -34,7 +34,7 @@ class Shown:
         if log_ns < self._due_ns:
             return
         self._due_ns = log_ns + EVERY_NS
-        self._writes.write(TF, self._picture.frames(state, percept), log_ns=log_ns, stamp_ns=percept.stamp_ns)
+        self._writer.write(TF, self._picture.frames(state, percept), log_ns=log_ns, stamp_ns=percept.stamp_ns)
         scene = self._picture.scene(percept)
         if scene is not None:
-            self._writes.write(SCENE, scene, log_ns=log_ns, stamp_ns=percept.stamp_ns)
+            self._writer.write(SCENE, scene, log_ns=log_ns, stamp_ns=percept.stamp_ns)

@@ -16,7 +16,7 @@ from perception.cameras.ring import N_SLOTS, SHARED, FrameReader, FrameWriter
 from perception.errors import CameraSilentError, PerceptionConfigError
 from robot.bus.envelope import Envelope, Origin
 from robot.bus.inlet import Received
-from robot.bus.topics import CAMERA_FRAME
+from robot.bus.topics import CAMERA_FRAME, CAMERA_IMAGE
 from robot.errors import WireError
 from robot.frames import CameraSpec, frame_of
 from robot.hal.protocols import Camera
@@ -147,7 +147,7 @@ class Air:
         self.is_cut, self.is_same_clock = False, True
 
     def publisher(self, topic):
-        assert topic is CAMERA_FRAME
+        assert topic in (CAMERA_FRAME, CAMERA_IMAGE)
         return self
 
     def subscriber(self, topic, on_message):
