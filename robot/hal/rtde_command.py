@@ -97,6 +97,7 @@ class RtdeCommand:
         self.control = self._connected()
         self._set_up(self.control, receive, clock)
         self._links.require()
+        self._was_seen = True  # it carried out what it was set up with
 
     def note(self, runtime: int) -> None:
         """Take note of a runtime state that was read: of our program's, once that was seen to run."""
