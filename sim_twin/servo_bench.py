@@ -12,6 +12,7 @@ from time import perf_counter
 
 import msgspec
 import numpy as np
+from msgspec.structs import replace
 from rich.console import Console
 from rich.progress import track
 
@@ -52,6 +53,7 @@ def bench_servo(*, full: bool, seconds: float | None = None) -> BenchReport:
     n_pairs = max(1, round(servo_s / (ours_s + bare_s)))
     host = _own_host()
     resolved = resolve(rig="virtual_lab")
+    resolved = replace(resolved, rig=replace(resolved.rig, address=host))
     thresholds = gc.get_threshold()
     with ControllerProcess(Setup(host=host)) as process:
         blocks = Blocks(address=host, resolved=resolved)
@@ -110,7 +112,10 @@ def _period_rows(blocks: Blocks) -> tuple[BenchResult, ...]:
             ok=ours.n > 0 and ours.over_share <= LATE_GOAL,
         ),
         BenchResult(name="bare_late_tick_share", value=bare.over_share, unit="share"),
-        BenchResult(name="stops", value=float(blocks.n_stops), unit="1", goal="= 0", ok=blocks.n_stops == 0),
+        BenchResult(
+            name="stops", value=float(len(blocks.stops)), unit="1", goal="= 0", ok=not blocks.stops,
+            details={f"{i}": why for i, why in enumerate(blocks.stops, 1)} if blocks.stops else msgspec.UNSET,
+        ),
         BenchResult(name="ticks", value=float(ours.n), unit="1"),
         BenchResult(name="servo_s", value=blocks.servo_s, unit="s"),
     )  # fmt: skip

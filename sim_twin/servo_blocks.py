@@ -4,25 +4,31 @@ import math
 import resource
 from collections.abc import Callable
 from contextlib import suppress
+from multiprocessing.connection import Connection
+from multiprocessing.sharedctypes import RawArray
 from time import perf_counter, sleep, thread_time
+from typing import cast
 
+import msgspec
 from rtde_control import RTDEControlInterface
 
 from config.resolved import Resolved
-from robot.errors import RobotError
 from robot.hal.protocols import Clock
-from robot.hal.rtde import RtdeArm
-from robot.messages import GripCommand, Heading
 from robot.realtime import CpuPin
+from robot.rigs import build_plant
+from robot.servo_messages import Stop
+from robot.servo_process import ServoServer
 from robot.tick_loop import TickLoop
+from robot.tick_notes import TickNotes
+from robot.tick_ring import TickWriter, ring_bytes
+from robot.tick_tap import BothTaps
+from sim_twin.servo_lead import Lead
 from sim_twin.tally import Tally
 
 __all__ = ["LATE_S", "PERIOD_S", "Blocks"]
 
 PERIOD_S = 0.002
 LATE_S = 1.5 * PERIOD_S
-INTENT_TICKS, TURN_RAD, STEP_M, HEIGHT_M = 25, 0.3, 0.01, 0.2
-"""A new intent every 50 ms, each turned from the one before: the tool goes round a circle of 7 cm."""
 SECOND_US = 1000
 SWING_RAD, SWING_S = 0.02, 2.0
 N_TRIES, PAUSE_S = 5, 0.2
@@ -34,37 +40,87 @@ class _Listener:
     The latter by the wall and by the processor, which leaves out what other processes took; and whether the kernel took
     the processor away meanwhile.
 
+    Args:
+        tell: called with each tick's period, time by the wall, time by the processor, and whether it was taken away.
+
     Attributes:
+        clock: The arm's.
         is_on: Whether it tells.
+        told_s: For how long it has told, in all.
     """
 
-    def __init__(self, clock: Clock, tell: Callable[[float, float, float, bool], None]) -> None:
-        self._clock, self._tell = clock, tell
-        self._woke_s = self._told_s = self._told_cpu_s = 0.0
+    def __init__(self, tell: Callable[[float, float, float, bool], None]) -> None:
+        self._tell = tell
+        self._woke_s = self._told_s = self._told_cpu_s = self._begun_s = 0.0
         self._n_preempted = 0
-        self.is_on = False
+        self.clock: Clock
+        self.is_on, self.told_s = False, 0.0
 
     def now_ns(self) -> int:
         """Return the time of the arm."""
-        return self._clock.now_ns()
+        return self.clock.now_ns()
 
     def begin(self) -> None:
-        """A block begins."""
+        """A block's ticks begin."""
         self._n_preempted = _n_preempted()
         self.is_on, self._woke_s = True, perf_counter()
+        self._begun_s = self._woke_s
         self._told_s, self._told_cpu_s = self._woke_s, thread_time()
+
+    def end(self) -> None:
+        """They are over. Idempotent."""
+        if self.is_on:
+            self.is_on, self.told_s = False, self.told_s + perf_counter() - self._begun_s
 
     def wait_tick(self) -> int:
         """Wait as the arm's clock does."""
         asleep_s, asleep_cpu_s = perf_counter(), thread_time()
         is_preempted = _n_preempted() > self._n_preempted
-        n_missed = self._clock.wait_tick()
+        n_missed = self.clock.wait_tick()
         if self.is_on:
             woke_s = perf_counter()
             self._tell(woke_s - self._woke_s, asleep_s - self._told_s, asleep_cpu_s - self._told_cpu_s, is_preempted)
             self._n_preempted, self._woke_s = _n_preempted(), woke_s
             self._told_s, self._told_cpu_s = perf_counter(), thread_time()  # telling is no part of a tick's work
         return n_missed
+
+
+class _Heard:
+    """The server's end of the pipe, which tells when an intent comes and when command is given up."""
+
+    def __init__(self, pipe: Connection, listener: _Listener, when_asked: Callable[[], None]) -> None:
+        self._pipe, self._listener, self._when_asked = pipe, listener, when_asked
+        self._stop = msgspec.msgpack.encode(Stop())
+        self.poll, self.send_bytes = pipe.poll, pipe.send_bytes
+
+    def recv_bytes(self, maxlength: int | None = None) -> bytes:
+        """Return the next request."""
+        raw = self._pipe.recv_bytes(maxlength)
+        if raw == self._stop:
+            self._listener.end()
+        self._when_asked()
+        return raw
+
+
+class _Pin:
+    """The pin of a thread that takes command, which is when ticks begin."""
+
+    def __init__(self, pin: CpuPin, listener: _Listener) -> None:
+        self._pin, self._listener = pin, listener
+        self.unpin = pin.unpin
+
+    def pin(self) -> None:
+        """Stay on the CPU, and tell of ticks."""
+        self._pin.pin()
+        self._listener.begin()
+
+
+class _DiedError(Exception):
+    """A servo process would have ended on the spot."""
+
+
+def _die() -> None:
+    raise _DiedError
 
 
 def _control_of(address: str) -> RTDEControlInterface:
@@ -88,8 +144,7 @@ class Blocks:
         own_work_p99_s: The 99th percentile of own_work, of every second.
         bare_period: From tick to tick with the client alone.
         bare_call: What the client's servoJ took there.
-        n_stops: Blocks of ours that ended before their time, by a refusal of the gate or a loss of the arm.
-        servo_s: How long our loop was in command.
+        stops: Of each block of ours that ended before its time, after how long and why: a refusal of the gate, a loss.
         cpu: Where this thread ticks, with either client.
     """
 
@@ -98,26 +153,35 @@ class Blocks:
 
         Args:
             address: the controller's.
-            resolved: its rig.
+            resolved: its rig, at this address.
         """
         self.period, self.own_work, self.own_cpu = Tally(over_s=LATE_S), Tally(), Tally()
         self.calm_work, self.intent_cpu = Tally(), Tally()
         self.own_work_p99_s: list[float] = []
         self._second, self._is_beginning = Tally(limit_us=SECOND_US), False
         self.bare_period, self.bare_call = Tally(over_s=LATE_S), Tally()
-        self.n_stops, self.servo_s = 0, 0.0
-        self._address, self._resolved = address, resolved
-        self._servo, self._tool = resolved.arm.servo, resolved.arm.tool
-        self.cpu = CpuPin(resolved.rig.realtime_priority)
+        self.stops: list[str] = []
         self._call_s = 0.0
+        self._listener = _Listener(self._take)
+        self._address, self._resolved = address, resolved
+        self._servo = resolved.arm.servo
+        self._ring = RawArray("B", ring_bytes(1.0 / PERIOD_S))
+        self._lead = Lead(resolved)
+        self.cpu = CpuPin(resolved.rig.realtime_priority)
         self._begin_anew()
+
+    @property
+    def servo_s(self) -> float:
+        """How long our loop was in command, in blocks that ended before their time, too."""
+        return self._listener.told_s
 
     def run_bare(self, duration_s: float) -> None:
         """Swing the base with the client's calls alone; a receive interface is open as it is in our blocks."""
         self.cpu.unpin()
-        self._arm.connect()
-        control = _control_of(self._arm.address)
-        q, servo, calls = list(self._arm.read().q_rad), self._servo, Tally()
+        arm = self._plant.arm
+        arm.connect()
+        control = _control_of(self._address)
+        q, servo, calls = list(arm.read().q_rad), self._servo, Tally()
         middle_rad = q[0]
         self.cpu.pin()
         begun_s = woke_s = perf_counter()
@@ -138,57 +202,66 @@ class Blocks:
         control.stopScript()
 
     def run_ours(self, duration_s: float) -> None:
-        """Lead the tool round a circle through motion, cell, gate and backend, as a servo process does."""
+        """Lead the tool round a circle by what a servo process runs: pipe, motion, cell, gate, backend and taps.
+
+        Another process asks for it, as a station does.
+        """
         self.cpu.unpin()
+        before_s = self.servo_s
+        self._server = self._server_of_block()
+        self._lead.begin(duration_s)
         try:
-            self._loop.connect()
-            self._loop.begin_epoch(0)
-            self._loop.engage()
-            self.cpu.pin()
-            is_whole = self._go_round(duration_s)
-        except RobotError:
-            is_whole = False
-        self._listener.is_on = False
-        self._arm.stop()
-        if not is_whole:
-            self.n_stops += 1
-            self.close()
+            self._server.run()
+        except _DiedError:
+            pass  # a servo process would have ended here; why is told below
+        finally:
+            self._listener.end()
+        why = self._lead.ended()
+        if why is not None:
+            self.stops.append(f"after {self.servo_s - before_s:.1f} s: {why}")
+            self._loop.close()
             self._begin_anew()
 
     def close(self) -> None:
-        """Stop and release the arm."""
+        """Stop and release the arm, and end who led it."""
         self._loop.close()
+        self._lead.close()
 
     def _begin_anew(self) -> None:
-        """Take another arm object: one that has lost its link is never taken again, and here its process goes on."""
+        """Take what a servo process is made of: one that has lost its link is never taken again, nor one closed."""
         resolved = self._resolved
-        self._arm = arm = RtdeArm(arm=resolved.arm, address=self._address)
-        self._listener = _Listener(arm.clock, self._take)
-        arm.clock = self._listener
+        self._plant = plant = build_plant(
+            rig=resolved.rig, arm=resolved.arm, scenario=resolved.scenario, cell=resolved.cell
+        )
+        self._listener.clock, plant.arm.clock = plant.arm.clock, self._listener
+        self._notes = TickNotes(rate_hz=plant.arm.spec.rate_hz)
         self._loop = TickLoop(
-            arm=arm,
+            arm=plant.arm,
             config=resolved.arm,
             scenario=resolved.scenario,
             rule_sets=resolved.rule_sets,
             rig=resolved.rig,
             profile=resolved.profile,
+            when_latched=lambda verdict: self._server.latched(verdict),
+            tap=BothTaps(self._notes, TickWriter(self._ring)),
         )
 
-    def _go_round(self, duration_s: float) -> bool:
-        """Tick for so long. Returns whether nothing was refused."""
-        opening_m = min(max(self._loop.seed().grip.opening_m, 0.0), self._tool.stroke_m)
-        grip = GripCommand(opening_m=opening_m, force_n=self._tool.grip_force_n, speed_m_s=self._tool.speed_m_s[0])
-        heading_rad, begun_s = 0.0, perf_counter()
-        self._listener.begin()
-        while (gone_s := perf_counter() - begun_s) < duration_s:
-            heading_rad += TURN_RAD
-            self._is_beginning = True
-            intent = Heading(heading_rad=heading_rad, distance_m=STEP_M, height_m=HEIGHT_M)
-            stride = self._loop.stride(intent, grip, n_ticks=INTENT_TICKS)
-            if stride.verdict is not None:
-                return False
-        self.servo_s += gone_s
-        return True
+    def _server_of_block(self) -> ServoServer:
+        """Return who serves one block; plant and loop are those of the blocks before, as in a servo process."""
+        return ServoServer(
+            connection=cast("Connection", _Heard(self._lead.pipe, self._listener, self._begin_intent)),
+            plant=self._plant,
+            loop=self._loop,
+            arm=self._resolved.arm,
+            pulse=RawArray("q", 1),
+            halt=RawArray("q", 1),
+            die=_die,
+            pin=cast("CpuPin", _Pin(self.cpu, self._listener)),
+            notes=self._notes,
+        )
+
+    def _begin_intent(self) -> None:
+        self._is_beginning = True
 
     def _take(self, period_s: float, spent_s: float, cpu_s: float, is_preempted: bool) -> None:
         self.period.add(period_s)
