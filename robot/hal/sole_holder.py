@@ -35,13 +35,14 @@ class SoleHolder:
         if self._name is not None:
             return
         name = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+        path = f"\0autotelic arm {_number_of(self._address)}"  # in the abstract namespace: no file is left behind
         try:
-            name.bind(self._path)
+            name.bind(path)
             name.listen(1)
         except OSError as error:
             name.close()
             raise WireError(
-                f"arm at {self._address}: another process of this machine holds it{self._whose()}, a robot node or who "
+                f"arm at {self._address}: another process of this machine holds it{_whose(path)}, a robot node or who "
                 "drives it: end that one first; where it stands still, wake it or kill it, and look at the arm"
             ) from error
         self._name = name
@@ -52,17 +53,25 @@ class SoleHolder:
         if name is not None:
             name.close()
 
-    @property
-    def _path(self) -> str:
-        return f"\0autotelic arm {self._address}"  # in the abstract namespace: no file is left behind
 
-    def _whose(self) -> str:
-        """Return in words which process has it, empty where that cannot be told."""
-        with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as asking:
-            asking.setblocking(False)
-            try:
-                asking.connect(self._path)
-                told = asking.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, _CREDENTIALS.size)
-            except OSError:
-                return ""
-        return f" (process {_CREDENTIALS.unpack(told)[0]})"
+def _number_of(address: str) -> str:
+    """Return the IP address that a name stands for: an arm has many names, and one arm. Itself where it stands for none.
+
+    Whoever connects to a name that stands for nothing is told so then.
+    """
+    try:
+        return min(str(found[4][0]) for found in socket.getaddrinfo(address, None, family=socket.AF_INET))
+    except OSError:
+        return address
+
+
+def _whose(path: str) -> str:
+    """Return in words which process has a name, empty where that cannot be told."""
+    with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as asking:
+        asking.setblocking(False)
+        try:
+            asking.connect(path)
+            told = asking.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, _CREDENTIALS.size)
+        except OSError:
+            return ""
+    return f" (process {_CREDENTIALS.unpack(told)[0]})"

@@ -46,3 +46,19 @@ def test_what_was_given_back_may_be_taken_by_another():
     first.release()
     second.take()
     second.release()
+
+
+def test_an_arm_has_one_name_however_it_is_called():
+    by_number, by_name = SoleHolder("127.0.0.1"), SoleHolder("localhost")
+    by_number.take()
+    with pytest.raises(WireError, match="localhost: another process"):
+        by_name.take()
+    by_number.release()
+
+
+def test_a_name_that_stands_for_nothing_is_held_as_it_is_written():
+    first, second = SoleHolder("nothing.invalid"), SoleHolder("nothing.invalid")
+    first.take()
+    with pytest.raises(WireError):
+        second.take()
+    first.release()
