@@ -196,18 +196,16 @@ class ServoServer:
     ) -> None:
         self._cpu, self._host_ns, self._notes = pin, host_ns, notes
         self._connection, self._plant, self._loop, self._tool = connection, plant, loop, arm.tool
-        self._intent_max_age_ns = round(arm.motion.intent_max_age_s * 1e9)
-        self._silent_ns = SILENT_AGES * self._intent_max_age_ns
+        self._silent_ns = SILENT_AGES * round(arm.motion.intent_max_age_s * 1e9)
         self._begin_ticks = round(BEGIN_S * plant.arm.spec.rate_hz)
         self._pulse, self._halt, self._die = pulse, halt, die
         self._decode = msgspec.msgpack.Decoder(Request).decode
         self._encode = msgspec.msgpack.Encoder().encode
         self._is_in_command = self._is_over = self._is_beginning = False
         self._grip: GripCommand | None = None
-        self._n_left = self._n_over = self._n_ticks = self._intent_ns = self._sequence = 0
+        self._n_left = self._n_over = self._n_ticks = self._sequence = 0
         self._answered_ns: int | None = None
         """When the last time step ended, host's time; None where there was none since the arm was seeded."""
-        self._is_resting = True
 
     def run(self) -> None:
         """Serve until closed, or until the arm was lost."""
@@ -266,8 +264,6 @@ class ServoServer:
                 self._send(StrideReply(stride=self._loop.report(None, is_begun=True), notes=self._noted()))
         else:
             self._n_over += 1
-            if not self._is_resting and self._now_ns() - self._intent_ns >= self._intent_max_age_ns:
-                self._rest()
 
     def _answer(self, request: Request) -> None:
         if isinstance(request, StrideRequest):
@@ -285,7 +281,7 @@ class ServoServer:
 
     def _begin_stride(self, request: StrideRequest) -> None:
         n_ticks, asked_ns, heard_ns = request.n_ticks, self._now_ns(), self._host_ns()
-        if self._is_resting:
+        if self._loop.is_resting:
             self._n_over = 0
         while self._is_in_command and self._n_over < min(self._begin_ticks, n_ticks // 2):
             self._tick()
@@ -295,12 +291,12 @@ class ServoServer:
         self._grip = request.grip
         self._is_beginning = True
         verdict = self._untimely(request.sequence, heard_ns) or self._loop.begin(
-            unpack_intent(request.intent), n_ticks=n_ticks, wait_at_m=request.wait_at_m, around=request.around
-        )
+            unpack_intent(request.intent), n_ticks=n_ticks, wait_at_m=request.wait_at_m, around=request.around,
+            asked_ns=asked_ns,
+        )  # fmt: skip
         self._is_beginning = False
         if verdict is None:
             self._n_left = max(n_ticks - self._n_over, n_ticks - n_ticks // 2)
-            self._intent_ns, self._is_resting = asked_ns, False
         else:
             self._end_unless_stopped()
 
@@ -368,14 +364,10 @@ class ServoServer:
         self._grip = GripCommand(
             opening_m=opening_m, force_n=self._tool.grip_force_n, speed_m_s=self._tool.speed_m_s[0]
         )
-        self._rest()
+        self._loop.rest()
         self._cpu.pin()
         self._is_in_command = True
         return state
-
-    def _rest(self) -> None:
-        self._loop.rest()
-        self._is_resting = True
 
     def _now_ns(self) -> int:
         return self._plant.arm.clock.now_ns()

@@ -153,15 +153,24 @@ class TickLoop:
         )
         self._obstacles = Obstacles(scenario)
         self._percept_max_age_ns = round(config.motion.percept_max_age_s * 1e9)
+        self._intent_max_age_ns = round(config.motion.intent_max_age_s * 1e9)
         self._tick_s, self._tick_ns = rig.tick_s, round(rig.tick_s * 1e9)
         self.state: ArmState
         self._read_ns = self._epoch = 0
+        self._n_asked = self._intent_ns = 0
+        """Ticks still to come that the newest intent was asked for, and when it was asked for, arm's time."""
+        self._is_resting = True
         self._before: ArmState
 
     @property
     def is_in_contact(self) -> bool:
         """Whether something holds the tool up."""
         return self._mover.is_in_contact
+
+    @property
+    def is_resting(self) -> bool:
+        """Whether it comes to rest, or is at rest, for want of an intent."""
+        return self._is_resting
 
     @property
     def gate(self) -> Gate:
@@ -221,6 +230,7 @@ class TickLoop:
         state = self._before = self._read_now()
         self._gate.seed(state)
         self._mover.seed(state)
+        self._n_asked, self._is_resting = 0, True
         self._obstacles.seed(state.digital_out, state.stamp_ns)
         self._surround()
         return state
@@ -266,11 +276,25 @@ class TickLoop:
         return self.report(verdict, is_begun=True)
 
     def begin(
-        self, intent: Intent, *, n_ticks: int, wait_at_m: Vec3 | None = None, around: Surroundings | None = None
+        self,
+        intent: Intent,
+        *,
+        n_ticks: int,
+        wait_at_m: Vec3 | None = None,
+        around: Surroundings | None = None,
+        asked_ns: int | None = None,
     ) -> Verdict | None:
         """Begin to carry out an intent; ticks do the rest. Returns the gate's refusal, if it refused.
 
-        With a percept that is too old nothing moves on: the arm comes to rest.
+        With a percept that is too old nothing moves on: the arm comes to rest. So it does in ticks beyond those that
+        were asked for, once the intent is too old.
+
+        Args:
+            intent: what to do, if the gate admits it.
+            n_ticks: how long.
+            wait_at_m: as in `stride`.
+            around: as in `stride`.
+            asked_ns: when it was asked for, arm's time; None where that was now.
         """
         before, now_ns = self.state, self._arm.clock.now_ns()
         verdict = self._gate.admit(intent, now_ns=now_ns)
@@ -278,6 +302,8 @@ class TickLoop:
             return self._told(verdict)
         if wait_at_m is not None and not all(map(isfinite, wait_at_m)):
             return self.latch(Reason.NOT_FINITE, f"expected a place to wait at, came {wait_at_m}")
+        self._n_asked, self._is_resting = n_ticks, False
+        self._intent_ns = now_ns if asked_ns is None else asked_ns
         if around is not None:
             self.perceive(around)
             if now_ns - around.stamp_ns > self._percept_max_age_ns:
@@ -296,7 +322,14 @@ class TickLoop:
 
     def rest(self) -> None:
         """Come to rest and stay there: what ticks do when the last intent is too old."""
+        self._n_asked, self._is_resting = 0, True
         self._mover.hold("no_intent")
+
+    def _rest_in_silence(self) -> None:
+        if self._n_asked:
+            self._n_asked -= 1
+        elif not self._is_resting and self._arm.clock.now_ns() - self._intent_ns >= self._intent_max_age_ns:
+            self.rest()
 
     def tick(self, grip: GripCommand) -> Verdict | None:
         """Run one tick and return the gate's refusal, if it refused."""
@@ -322,6 +355,7 @@ class TickLoop:
             if verdict is None:
                 arm.clock.wait_tick()
                 self._read_now()
+                self._rest_in_silence()
         except WireError as error:
             untaken = None if command is gate.sent else command
             return self._told(gate.latch(_reason_of(error), str(error), now_ns=now_ns, refused=untaken))

@@ -55,7 +55,7 @@ class SoleHolder:
 
 
 def _number_of(address: str) -> str:
-    """Return the IP address that a name stands for: an arm has many names, and one arm. Itself where it stands for none.
+    """Return the IP address that a name stands for, itself where it stands for none: an arm may be called many names.
 
     Whoever connects to a name that stands for nothing is told so then.
     """
