@@ -11,7 +11,8 @@ from typing import Any, NamedTuple
 import msgspec
 import numpy as np
 
-from learning.one_change import OneChange, one_change
+from learning.allowed_mass import AllowedMass
+from learning.one_change import LISTED, OneChange, one_change
 
 __all__ = ["START", "Belief", "Evidence", "Kind", "Needs", "Situation", "conjunctions", "mask", "one_change_apart"]
 
@@ -129,6 +130,9 @@ class Belief:
         self._prior = weights / weights.sum()
         self._words = self._on | self._off << WORD  # (h,)
         self._one_change = _one_change(needs, n_goals, goal, max_literals)
+        is_many = len(needs) > LISTED
+        self._mass = AllowedMass(n_goals=n_goals, goal=goal, max_literals=max_literals) if is_many else None
+        """For many conjunctions; few are multiplied out, so that what was reported of them stays bit for bit."""
         self._n_goals = n_goals
         self._false_positive = false_positive
         self._hits = np.zeros(len(needs))  # (h,)
@@ -155,6 +159,7 @@ class Belief:
         self._predicted: dict[Situation, float] = {}
         self._marginals: tuple[tuple[float, float], ...] | None = None
         self._is_hit: bool | None = None
+        self._successes: np.ndarray | None = None
         """What was worked out already of these probabilities and records."""
 
     def expect_change(self, hazard: float, *, local: float = 0.0) -> None:
@@ -232,8 +237,15 @@ class Belief:
         if situation not in self._predicted:
             if len(self._predicted) >= MOST_KEPT:
                 self._predicted.clear()
-            self._predicted[situation] = float(self.probabilities @ self.allows(situation))
+            self._predicted[situation] = self._sum_allowed(self.probabilities, situation)
         return self._predicted[situation]
+
+    def _sum_allowed(self, weights: np.ndarray, situation: Situation) -> float:
+        """Return the sum of the weights of the conjunctions that allow the goal in a situation.  (h,) -> ()"""
+        holds, latched = situation
+        if self._mass is None or holds & ~latched:
+            return float(weights @ self.allows(situation))
+        return self._mass.of(weights, holds=holds, latched=latched)
 
     def predict_success(self, situation: Situation) -> float:
         """Return the chance of success in a situation: that the goal is allowed, and the skill where it is.
@@ -242,7 +254,11 @@ class Belief:
         """
         if not self.was_achieved:
             return self.predict_allowed(situation)
-        return float(self.probabilities @ (self.allows(situation) * self._skills()))
+        if self._mass is None:
+            return float(self.probabilities @ (self.allows(situation) * self._skills()))
+        if self._successes is None:
+            self._successes = self.probabilities * self._skills()
+        return self._sum_allowed(self._successes, situation)
 
     def _skills(self) -> np.ndarray:
         """Return each conjunction's skill, the mean of Beta(1 + hits, 1 + misses).  () -> (h,)"""
@@ -262,6 +278,8 @@ class Belief:
         return self._marginals
 
     def _work_out_marginals(self) -> tuple[tuple[float, float], ...]:
+        if self._mass is not None:
+            return tuple(self._mass.marginals(self.probabilities))
         bits = 1 << np.arange(self._n_goals, dtype=np.int64)
         on = self.probabilities @ ((self._on[:, None] & bits) != 0)  # (h,) @ (h, n) -> (n,)
         off = self.probabilities @ ((self._off[:, None] & bits) != 0)
