@@ -29,6 +29,7 @@ __all__ = [
 RESERVED_NAMES = ("table", "gripper", "hand", "tool", "world")
 """Names that mean something by themselves in distances, rules or the simulated world."""
 ROUNDING_M = 1e-9
+TWIN = "twin"
 CAP_M = 0.015
 """Height of a button's cap and of the ring that holds it."""
 
@@ -148,10 +149,15 @@ def _check_motion(arm: ArmConfig, checker: Checker) -> None:
 
 
 def check_rig(rig: Rig, file: str) -> None:
-    """Check that a rig's ticks are made of whole physics steps."""
+    """Check that a rig's ticks are made of whole physics steps, and that only a twin is to differ from its files."""
     n_steps = rig.tick_s / rig.physics_s
     is_whole = n_steps >= 0.5 and abs(n_steps - round(n_steps)) < 1e-6
-    Checker(file).need(is_whole, "physics_s", f"a whole part of tick_s = {rig.tick_s:g}", f"{rig.physics_s:g}")
+    checker = Checker(file)
+    checker.need(is_whole, "physics_s", f"a whole part of tick_s = {rig.tick_s:g}", f"{rig.physics_s:g}")
+    can_differ = rig.perturbation is None or rig.expected.kind == TWIN
+    checker.need(
+        can_differ, "perturbation", "none but for a twin, whose physics can be changed", f"one, of {rig.expected.kind}"
+    )
 
 
 def check_sweep(sweep: Sweep, file: str) -> None:

@@ -124,6 +124,9 @@ class Expert(Section, frozen=True, kw_only=True):
     boredom_sigma: Positive = 0.05
     lamps_drawn: Share = 0.5
     """Share of a batch in which lamps are drawn at random, and whether they are in failures; 0 leaves it out."""
+    carried_out: Share = 1.0
+    """Share of trials in which the arm does what the expert asks; in the others it strays, and nobody is told. Below 1
+    to see what those above an expert bear."""
     detour: Annotated[int, Meta(ge=0, le=1000)] = 15
     """Time steps for which curiosity leads a model away that is stuck, while learning; 0 leaves it where it is."""
     horizon: Count = 70

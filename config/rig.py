@@ -4,6 +4,7 @@ from typing import Annotated
 
 from msgspec import Meta
 
+from config.perturbation import Perturbation
 from config.values import Angle, Name, Section
 
 __all__ = ["DEFAULT_LIMITS", "NodeStart", "PlantExpected", "Rig", "RigCamera"]
@@ -98,6 +99,8 @@ class Rig(Section, frozen=True, kw_only=True):
     nodes: tuple[NodeStart, ...] = ()
     """What `autotelic up` starts, in this order."""
     expected: PlantExpected
+    perturbation: Perturbation | None = None
+    """How its plant differs from the files, where that is tried; a twin alone does."""
     tick_s: Annotated[float, Meta(ge=0.002, le=0.05)] = 0.01
     physics_s: Annotated[float, Meta(ge=0.0005, le=0.01)] = 0.002
     realtime_priority: Annotated[int, Meta(ge=0, le=90)] = 0

@@ -10,9 +10,11 @@ from learning.evaluation_pool import MakeLearner
 from learning.experts import ExpertSet
 from learning.goal_selector import GoalSelector
 from learning.goals import GoalJudge
+from learning.interfaces import Experts
 from learning.seeds import named_generator
 from learning.stops import Stops, stops_of
 from learning.stopwatch import Stopwatch
+from learning.straying import StrayingExperts
 from learning.subgoal_selector import make_subgoal_selector
 from robot.messages import ArmState, PlantIdentity, StationSpec
 from robot.operated import OperatedStation, operator_of
@@ -93,11 +95,18 @@ def build_agent(resolved: Resolved, spec: StationSpec, *, seed: int, stopwatch: 
         subgoal_selector=make_subgoal_selector(
             n_goals=n_goals, config=learning.subgoal_selection, rng=named_generator(seed, "subgoal_selector")
         ),
-        experts=ExpertSet(learning, spec, n_goals=n_goals, rng=named_generator(seed, "experts")),
+        experts=_experts(resolved, spec, seed=seed),
         judge=GoalJudge(scenario, spec),
         protocol=learning.experiment,
         stopwatch=stopwatch,
     )
+
+
+def _experts(resolved: Resolved, spec: StationSpec, *, seed: int) -> Experts:
+    learning, n_goals = resolved.learning, len(resolved.scenario.goals)
+    experts = ExpertSet(learning, spec, n_goals=n_goals, rng=named_generator(seed, "experts"))
+    share = learning.expert.carried_out
+    return experts if share == 1.0 else StrayingExperts(experts, spec, share=share, seed=seed)
 
 
 def learner_maker(resolved: Resolved, *, seed: int) -> MakeLearner:

@@ -1,18 +1,19 @@
 """A test of what a run's newest checkpoint holds, apart from the run itself."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import msgspec
 
 from config.loader import with_rig
 from config.resolved import Resolved
+from learning.agent import Agent
 from learning.assembly import RobotLearner
 from learning.checkpoint import taking_up
 from learning.errors import LearningError
 from learning.evaluation import GoalTest, evaluation_row, learnt_graph, run_test
 from learning.explain import Explanation, explain_graph
 from learning.graph import Graph
-from learning.metrics import graph_errors, reachable_states
+from learning.metrics import Allowed, graph_errors, reachable_states
 from learning.recorded import RecordedDecisions
 from learning.recording import RecordWanted, open_recording
 from learning.rows import EvaluationRow
@@ -62,6 +63,8 @@ def assess(
     rig: str | None = None,
     tell: Callable[[str], object] = lambda _: None,
     record: RecordWanted | None = None,
+    goals: Sequence[int] | None = None,
+    when_tested: Callable[[EvaluationRow], object] = lambda _: None,
 ) -> Assessed:
     """Return a row a goal: learning off, the newest checkpoint, from fresh table layouts.
 
@@ -73,6 +76,8 @@ def assess(
         rig: shipped rig or a file to test on; None takes the run's own.
         tell: told after every test epoch how far it is, in words.
         record: where it is recorded; None records nothing.
+        goals: which goals to test; None tests all.
+        when_tested: hears each goal's row as soon as it is there.
 
     Raises:
         ConfigError: the rig's file is missing or wrong, or it is another arm's.
@@ -94,7 +99,7 @@ def assess(
             n_tests=n_tests,
             n_trials=manifest.n_trials,
         )
-        for goal in range(n_goals)
+        for goal in (range(n_goals) if goals is None else goals)
     ]
     recording = None
     if record is not None:
@@ -105,23 +110,28 @@ def assess(
     try:
         with taking_up():
             learner.agent.load_state_dict(state["agent"])
-        scores = []
+        graph = _graph(learner.agent, lambda goal, latched: oracle(goal, latched, epoch), n_goals)
+        rows = []
         for test in tests:
             heard = _Count(f"{manifest.goals[test.goal].name}, goal {test.goal + 1} of {n_goals}", tell)
-            scores.append(run_test(learner.agent, station, test, when_tested=heard))
-        predicted = learnt_graph(learner.agent)
+            score = run_test(learner.agent, station, test, when_tested=heard)
+            rows.append(evaluation_row(test, score, graph[test.goal]))
+            when_tested(rows[-1])
     finally:
         stops = learner.stops
         learner.close()
         if recording is not None:
             recording.close()
-    graph: list[tuple[int, int] | None] = [None] * n_goals
-    if predicted is not None:
-        states = reachable_states(lambda goal, latched: oracle(goal, latched, epoch), n_goals)
-        wrong = graph_errors(predicted, lambda goal, latched: oracle(goal, latched, epoch), states, n_goals)
-        graph = [(len(states), n) for n in wrong]
-    rows = tuple(evaluation_row(test, score, entry) for test, score, entry in zip(tests, scores, graph, strict=True))
-    return Assessed(rows=rows, stops=stops)
+    return Assessed(rows=tuple(rows), stops=stops)
+
+
+def _graph(agent: Agent, allowed: Allowed, n_goals: int) -> list[tuple[int, int] | None]:
+    """Return for each goal in how many goal-states what was learnt was compared with the rules, and was wrong."""
+    predicted = learnt_graph(agent)
+    if predicted is None:
+        return [None] * n_goals
+    states = reachable_states(allowed, n_goals)
+    return [(len(states), n_wrong) for n_wrong in graph_errors(predicted, allowed, states, n_goals)]
 
 
 def _recorded_learner(

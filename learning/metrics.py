@@ -10,6 +10,7 @@ from learning.interfaces import GoalState
 from learning.rows import EvaluationRow, GoalRow, GraphRow
 
 __all__ = [
+    "Allowed",
     "Era",
     "EraSummary",
     "Summary",

@@ -9,7 +9,7 @@ from learning.agent import Agent
 from learning.assembly import RobotLearner, build_agent, learner_maker
 from learning.checkpoint import encode
 from learning.ended import Ended
-from learning.errors import RunFolderError
+from learning.errors import LearningError, RunFolderError
 from learning.evaluation_pool import EvaluationPool
 from learning.experiment import Experiment, Plan
 from learning.experts import ExpertSet
@@ -68,10 +68,12 @@ class Session:
 
         Raises:
             SessionError: one is torn, or of another scenario, or they show nothing.
+            LearningError: its experts stray.
         """
         learner = self._learner
         experts = learner.agent.experts
-        assert isinstance(experts, ExpertSet), "build_agent makes one"
+        if not isinstance(experts, ExpertSet):
+            raise LearningError("expected experts whose moves are all carried out (expert.carried_out: 1) to teach")
         scenario = self._resolved.scenario.name
         taught = teach(learner.agent, experts, learner.station.spec, paths, scenario=scenario)
         self._folder.write_json(TAUGHT_NAME, taught)

@@ -19,7 +19,7 @@ stack happened to do:
 import msgspec
 
 from config.limits import Profile
-from sim_twin.perturb import Perturbation
+from config.perturbation import Perturbation
 from sim_twin.scales import keep_out_scale_m, least_half_m, plane_scale_m
 
 __all__ = ["Allowances", "allowances_for"]

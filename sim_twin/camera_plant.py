@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from types import MappingProxyType
 
+import msgspec
 import numpy as np
 
 from config.arm import ArmConfig
@@ -13,6 +14,7 @@ from robot.errors import RobotConfigError, WireError
 from robot.frames import CameraSpec, Frame
 from robot.hal.protocols import Arm, Camera, Resetter, SceneTruth
 from robot.messages import PlantIdentity
+from sim_twin.perturbing import moved
 from sim_twin.plant import TwinPlant, TwinWorld
 from sim_twin.render import HOW_TO_DRAW, NoGLError, light_lamps
 from sim_twin.rendered_camera import Optics, RenderedCamera
@@ -97,7 +99,7 @@ class CameraTwinPlant:
     def __init__(self, *, arm: ArmConfig, scenario: Scenario, rig: Rig, cell: CellConfig | None = None) -> None:
         twin = TwinPlant(arm=arm, scenario=scenario, rig=rig, cell=cell)
         self._twin = twin
-        self._camera = WatchingCamera(twin.world, RIG_VIEW)
+        self._camera = WatchingCamera(twin.world, _view_of(rig))
         twin.world.after_tick = self._camera.watch
         self.identity: PlantIdentity = twin.identity
         self.arm: Arm = twin.arm
@@ -114,6 +116,15 @@ class CameraTwinPlant:
     def model_sha256(self) -> str:
         """Digest of the compiled model, as the plain twin's."""
         return self._twin.model_sha256
+
+
+def _view_of(rig: Rig) -> View:
+    """Return the rig's view; a camera that was moved sees everything moved the other way."""
+    if rig.perturbation is None:
+        return RIG_VIEW
+    x, y, z = rig.perturbation.percept_m
+    eye, target = (moved(place, (-x, -y, -z)) for place in (RIG_VIEW.eye_m, RIG_VIEW.target_m))
+    return msgspec.structs.replace(RIG_VIEW, eye_m=eye, target_m=target)
 
 
 class _CameraResetter:

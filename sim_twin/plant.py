@@ -11,6 +11,7 @@ from config.arm import ArmConfig
 from config.cell import CellConfig
 from config.rig import Rig
 from config.scenario import Scenario
+from robot.chain import ToolChain
 from robot.clock import LockStepClock
 from robot.errors import NotEngagedError, StaleStateError
 from robot.hal.protocols import Arm, Camera, Clock, Resetter, SceneTruth
@@ -31,6 +32,7 @@ from robot.messages import (
     Vec6,
 )
 from sim_twin.names import on_table
+from sim_twin.perturbing import moved, perturb_model, perturbed_arm
 from sim_twin.plant_reading import Addresses, Fingers, arm_reading
 from sim_twin.scene import build_scene
 from sim_twin.table import TableDrive
@@ -46,11 +48,18 @@ STILL_M_S = 0.004
 
 
 class TwinWorld:
-    """Model, data and the table's drives: the one place where physics advances."""
+    """Model, data and the table's drives: the one place where physics advances.
+
+    Where the rig says so they differ from the files; `arm` is then the arm as it is.
+    """
 
     def __init__(self, arm: ArmConfig, scenario: Scenario, rig: Rig) -> None:
-        self.arm, self.scenario, self.tick_s = arm, scenario, rig.tick_s
+        by = rig.perturbation
+        self.arm = arm = arm if by is None else perturbed_arm(arm, by)
+        self.scenario, self.tick_s = scenario, rig.tick_s
         self.model = build_scene(arm, scenario, physics_s=rig.physics_s, tick_s=rig.tick_s).compile()
+        if by is not None:
+            perturb_model(self.model, by)
         self.model_sha256 = _digest(self.model)
         self.data = mujoco.MjData(self.model)
         self.table = TableDrive(self.model, self.data, scenario, tick_s=rig.tick_s)
@@ -67,7 +76,7 @@ class TwinWorld:
         self.grip_control = self.model.actuator("grip").id
         self.grip_set_point = self.data.ctrl[self.grip_control : self.grip_control + 1]
         self.stop_speed_rad_s: Array | None = None
-        self.stop_rad_s2 = STOP_RAD_S2
+        self.stop_rad_s2 = STOP_RAD_S2 * (1.0 if by is None else by.braking_factor)
         self.joint_controls = np.array([self.model.actuator(j.name).id for j in arm.joints])
         self.finger_addresses = [int(self.model.joint(f"finger_{s}").qposadr[0]) for s in ("left", "right")]
 
@@ -145,8 +154,16 @@ def _fill_history(model: mujoco.MjModel, data: mujoco.MjData) -> None:
 class TwinArm:
     """The arm, its hand and its inputs and outputs on the twin."""
 
-    def __init__(self, world: TwinWorld) -> None:
+    def __init__(self, world: TwinWorld, *, believed: ToolChain | None = None) -> None:
+        """Take the arm of a world.
+
+        Args:
+            world: that it is in.
+            believed: tells the tool's place by the joints, where the controller takes it from its own kinematics; None
+                tells it as it is.
+        """
         self._world = world
+        self._believed = believed
         self.clock: Clock = world.clock
         joints = world.arm.joints
         self.spec = ArmSpec(
@@ -188,6 +205,8 @@ class TwinArm:
             raise StaleStateError("twin arm: expected connect() before read(); nothing was read")
         world = self._world
         q, qd, place, turn, speed, pushed, fingers = self._reading()
+        if self._believed is not None:
+            place = self._believed.tcp(q)
         return ArmState(
             stamp_ns=world.clock.now_ns(),
             q_rad=q,
@@ -242,10 +261,11 @@ class TwinArm:
 
 
 class TwinTruth:
-    """Poses of everything the scenario names, straight from the physics."""
+    """Poses of everything the scenario names, straight from the physics, but for how far off it is to tell them."""
 
-    def __init__(self, world: TwinWorld) -> None:
+    def __init__(self, world: TwinWorld, *, off_m: Vec3 = (0.0, 0.0, 0.0)) -> None:
         self._world = world
+        self._off_m = off_m if any(off_m) else None
         scenario, model = world.scenario, world.model
         self._entries = [
             (
@@ -264,12 +284,15 @@ class TwinTruth:
             objects=tuple(
                 ObjectPose(
                     name=name,
-                    position_m=_vec3(data.xpos[body if cap is None else cap]),
+                    position_m=self._told(_vec3(data.xpos[body if cap is None else cap])),
                     quat=_quat(data.xquat[body]),
                 )
                 for name, body, cap in self._entries
             ),
         )
+
+    def _told(self, place_m: Vec3) -> Vec3:
+        return place_m if self._off_m is None else moved(place_m, self._off_m)
 
 
 class TwinResetter:
@@ -293,12 +316,14 @@ class TwinPlant:
 
     def __init__(self, *, arm: ArmConfig, scenario: Scenario, rig: Rig, cell: CellConfig | None = None) -> None:
         del cell  # signals are the table's own here: there are no terminals between
+        by = rig.perturbation
         self._world = TwinWorld(arm, scenario, rig)
         self.identity = PlantIdentity(kind=PlantKind.TWIN, model=arm.name, serial="twin")
-        self.arm: Arm = TwinArm(self._world)
+        believed = ToolChain(arm) if by is not None and by.tells_belief else None
+        self.arm: Arm = TwinArm(self._world, believed=believed)
         self.cameras: Mapping[str, Camera] = {}
-        self.truth: SceneTruth | None = TwinTruth(self._world)
-        self.resetter: Resetter = TwinResetter(self._world, Kinematics(arm))
+        self.truth: SceneTruth | None = TwinTruth(self._world, off_m=(0.0, 0.0, 0.0) if by is None else by.percept_m)
+        self.resetter: Resetter = TwinResetter(self._world, Kinematics(self._world.arm))
         self._world.put(draw_layout(scenario, np.random.default_rng(0)), arm.home_rad, digital_out=0)
 
     @property

@@ -1,6 +1,5 @@
 """`autotelic sweep FILE`: many runs as one job, here or on a cluster. The edge: terminal, files and host clock."""
 
-import os
 from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from time import perf_counter, sleep
@@ -19,10 +18,9 @@ from learning.report import Run, load_run
 from learning.report_files import learners_of, write_report
 from learning.run_folder import RunFolder
 from learning.sweeping.cells import is_finished
+from learning.sweeping.choosing import checked_place, make_executor
 from learning.sweeping.executor import Executor
-from learning.sweeping.local import LocalExecutor
 from learning.sweeping.manifest import take_folder
-from learning.sweeping.on_ray import RayExecutor
 from learning.sweeping.runner import SweepRunner
 from learning.sweeping.table import Pace, sweep_table
 from learning.telling import report_tables
@@ -31,7 +29,6 @@ from robot.stop_request import StopRequest
 __all__ = ["sweep"]
 
 EXIT_FAILED, EXIT_USAGE, EXIT_INTERRUPTED = 1, 2, 130
-HERE, RAY = "here", "ray"
 LOOK_S = 0.2
 A_SECOND = 2
 
@@ -56,10 +53,10 @@ def sweep(
     try:
         wanted = load_sweep(file)
         n_epochs = _check(wanted)
-        name = _checked_name(on)
+        name = checked_place(on)
         folder = RunFolder(out or Path("runs") / f"sweep-{wanted.name}")
         with folder:
-            executor = _executor(name, jobs, folder.path / "logs")
+            executor = make_executor(name, jobs, folder.path / "logs")
             runner = _run(wanted, folder.path.absolute(), executor, n_epochs=n_epochs)
             _end(runner, json=json)
     except (ConfigError, LearningError) as error:
@@ -81,24 +78,6 @@ def _check(wanted: Sweep) -> int:
             for preset in wanted.presets:
                 resolve(rig=rig, scenario=scenario, learning=preset)
     return wanted.epochs or max(load_learning(preset).experiment.epochs for preset in wanted.presets)
-
-
-def _checked_name(on: str) -> str:
-    if on not in (HERE, RAY) and not (on.startswith(f"{RAY}:") and on != f"{RAY}:"):
-        raise typer.BadParameter(f"expected {HERE}, {RAY} or {RAY}:ADDRESS, got {on}", param_hint="--on")
-    return on
-
-
-def _executor(on: str, jobs: int | None, logs: Path) -> Executor:
-    """Return who runs cells.
-
-    Raises:
-        LearningError: there is no such cluster, or Ray is not installed.
-    """
-    if on == HERE:
-        return LocalExecutor(n_slots=jobs or len(os.sched_getaffinity(0)), logs=logs)
-    _, _, address = on.partition(":")
-    return RayExecutor(address=address or None, n_slots=jobs, logs=logs)
 
 
 def _run(wanted: Sweep, folder: Path, executor: Executor, *, n_epochs: int) -> SweepRunner:

@@ -1,6 +1,5 @@
-"""A sweep under way: which cell is started next, which again, and which is given up. State, no clock, no terminal."""
+"""A sweep under way: its cells as tasks, and what failed of them kept in its manifest. State, no clock, no terminal."""
 
-from collections import deque
 from collections.abc import Callable
 from pathlib import Path
 
@@ -8,13 +7,35 @@ import msgspec
 
 from config.sweep import Sweep
 from learning.sweeping.cells import Cell, cells_of, epochs_done, is_finished, words_of
-from learning.sweeping.executor import End, Executor, Job
+from learning.sweeping.executor import Executor, Job
 from learning.sweeping.manifest import Failure, SweepManifest, write_manifest
+from learning.sweeping.retrying import JobRunner
 
 __all__ = ["SweepRunner"]
 
 
-class SweepRunner:
+class _CellTask:
+    """A cell as what is run until its run is whole (learning.sweeping.retrying.Task)."""
+
+    def __init__(self, cell: Cell, sweep: Sweep, folder: Path) -> None:
+        self._cell, self._sweep, self._folder = cell, sweep, folder
+
+    @property
+    def name(self) -> str:
+        return self._cell.name
+
+    def job(self) -> Job:
+        words = words_of(self._cell, self._sweep, self._folder)
+        return Job(name=self.name, words=words, memory_mb=self._sweep.cell_memory_mb)
+
+    def n_done(self) -> int:
+        return epochs_done(self._cell, self._folder)
+
+    def is_finished(self) -> bool:
+        return is_finished(self._cell, self._folder)
+
+
+class SweepRunner(JobRunner):
     """Runs the cells that are not finished, and those that fail again while they come on.
 
     Args:
@@ -25,8 +46,6 @@ class SweepRunner:
 
     Attributes:
         cells: All of the sweep.
-        running: Those under way.
-        given_up: Those that failed too often without coming on, and why.
     """
 
     def __init__(
@@ -37,15 +56,12 @@ class SweepRunner:
         executor: Executor,
         tell: Callable[[str], object],
     ) -> None:
-        self._manifest, self._folder, self._executor, self._tell = manifest, folder, executor, tell
+        self._manifest, self._folder = manifest, folder
         self.cells = cells_of(manifest.sweep)
-        self.running: dict[str, Cell] = {}
-        self.given_up: dict[str, str] = {}
-        self._waiting = deque(cell for cell in self.cells if not is_finished(cell, folder))
-        self._begun_at: dict[str, int] = {}
-        self._n_vain: dict[str, int] = {}
-        """Starts that came no further, one after the other."""
-        self._is_stopping = False
+        tasks = [_CellTask(cell, manifest.sweep, folder) for cell in self.cells]
+        super().__init__(
+            tasks, executor=executor, tries=manifest.sweep.tries, tell=tell, when_failed=self._keep_failure
+        )
 
     @property
     def sweep(self) -> Sweep:
@@ -57,55 +73,7 @@ class SweepRunner:
         """Where."""
         return self._folder
 
-    @property
-    def n_finished(self) -> int:
-        """Cells whose runs are whole."""
-        return sum(is_finished(cell, self._folder) for cell in self.cells)
-
-    @property
-    def is_over(self) -> bool:
-        """Whether nothing runs, and nothing is to be started any more."""
-        return not self.running and (self._is_stopping or not self._waiting)
-
-    def look(self) -> None:
-        """Take note of what ended, and start what there is room for."""
-        for end in self._executor.ended():
-            self._take(end)
-        while self._waiting and not self._is_stopping and len(self.running) < self._executor.n_slots:
-            self._start(self._waiting.popleft())
-
-    def stop(self) -> None:
-        """Start nothing any more, and ask what runs to come to an end that loses nothing."""
-        if not self._is_stopping:
-            self._is_stopping = True
-            self._executor.ask_to_stop()
-
-    def _start(self, cell: Cell) -> None:
-        self._begun_at[cell.name] = epochs_done(cell, self._folder)
-        self.running[cell.name] = cell
-        words = words_of(cell, self.sweep, self._folder)
-        self._executor.start(Job(name=cell.name, words=words, memory_mb=self.sweep.cell_memory_mb))
-        at = self._begun_at[cell.name]
-        self._tell(f"{cell.name}: {f'goes on from about epoch {at}' if at else 'begins'}")
-
-    def _take(self, end: End) -> None:
-        cell = self.running.pop(end.name)
-        if is_finished(cell, self._folder):
-            self._tell(f"{cell.name}: finished")
-        elif not self._is_stopping:
-            self._fail(cell, end.why_failed or "ended before its epochs were done, and said that all was well")
-
-    def _fail(self, cell: Cell, why: str) -> None:
-        at = epochs_done(cell, self._folder)
-        failure = Failure(cell=cell.name, epoch=at, why=why)
-        failures = (*self._manifest.failures, failure)
+    def _keep_failure(self, name: str, at: int, why: str) -> None:
+        failures = (*self._manifest.failures, Failure(cell=name, epoch=at, why=why))
         self._manifest = msgspec.structs.replace(self._manifest, failures=failures)
         write_manifest(self._folder, self._manifest)
-        n_vain = 0 if at > self._begun_at[cell.name] else self._n_vain.get(cell.name, 0)
-        self._n_vain[cell.name] = n_vain + 1
-        if self._n_vain[cell.name] >= self.sweep.tries:
-            self.given_up[cell.name] = why
-            self._tell(f"{cell.name}: given up after {self.sweep.tries} tries at epoch {at}: {why}")
-        else:
-            self._waiting.append(cell)
-            self._tell(f"{cell.name}: failed at epoch {at} and is tried again: {why}")

@@ -49,8 +49,8 @@ def sweep_table(runner: SweepRunner, pace: Pace, *, seconds: float) -> Table:
         f"{runner.sweep.name}: {runner.n_finished} of {len(runner.cells)} cells, "
         f"{100 * n_done / pace.n_all:.0f} %{left}"
     )
-    for name, cell in runner.running.items():
-        at = epochs_done(cell, runner.folder)
+    for name, task in runner.running.items():
+        at = task.n_done()
         table.add_row(name, f"{at} of {pace.n_epochs}", ProgressBar(total=pace.n_epochs, completed=at, width=30))
     if runner.given_up:
         table.caption = f"given up: {', '.join(runner.given_up)}"

@@ -11,12 +11,13 @@ from collections.abc import Iterator
 import msgspec
 
 from config.limits import Profile
+from config.perturbation import Perturbation
 from config.resolved import Resolved
 from robot.teleop.battery import FAMILIES, Battery
 from sim_twin.checking.check import FULL_STREAMS
 from sim_twin.checking.ring import Ring
 from sim_twin.checking.weakenings import BY, Mutation
-from sim_twin.perturb import NOMINAL, Perturbation
+from sim_twin.perturb import NOMINAL
 from sim_twin.readings import Reading
 
 __all__ = ["Outcome", "try_mutation"]

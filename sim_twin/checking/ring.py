@@ -5,6 +5,7 @@ from collections.abc import Callable, Iterator
 import msgspec
 
 from config.limits import Profile
+from config.perturbation import Perturbation
 from config.resolved import Resolved
 from robot.errors import NotEngagedError
 from robot.messages import ArmCommand, GripCommand, Hold, StationMode, Vec6
@@ -15,7 +16,7 @@ from robot.tick_loop import TickLoop
 from sim_twin.allowances import allowances_for
 from sim_twin.as_seen import AsSeen, Beginning
 from sim_twin.monitor import Monitor
-from sim_twin.perturb import Perturbation, perturbed_plant
+from sim_twin.perturb import perturbed_plant
 from sim_twin.readings import Margin, Reading
 from sim_twin.recorder import Course, Recorder
 
