@@ -4,6 +4,7 @@ from typing import Annotated
 
 from msgspec import Meta
 
+from config.fitted import FittedPlant
 from config.values import Angle, Length, Mass, Name, NonNegative, Point, Positive, Section, Span
 
 __all__ = ["ArmConfig", "Capsule", "Joint", "MotionLimits", "Servo", "Tool"]
@@ -118,3 +119,5 @@ class ArmConfig(Section, frozen=True, kw_only=True):
     """A tool-down pose over the table, used to seed inverse kinematics."""
     tool_yaw_rad: Angle = 0.0
     """Turn of the tool about the vertical while working with Heading intents."""
+    fitted: FittedPlant | None = None
+    """How this very arm differs from that, by sessions of it (`autotelic twin fit`): for the twin's physics alone."""

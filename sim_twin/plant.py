@@ -1,7 +1,7 @@
 """The twin: the Plant door in front of MuJoCo, in lock-step."""
 
 import hashlib
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 
 import mujoco
 import numpy as np
@@ -31,6 +31,7 @@ from robot.messages import (
     Vec3,
     Vec6,
 )
+from sim_twin.fitted import Smoothing, nominal_plant
 from sim_twin.names import on_table
 from sim_twin.perturbing import moved, perturb_model, perturbed_arm
 from sim_twin.plant_reading import Addresses, Fingers, arm_reading
@@ -78,7 +79,28 @@ class TwinWorld:
         self.stop_speed_rad_s: Array | None = None
         self.stop_rad_s2 = STOP_RAD_S2 * (1.0 if by is None else by.braking_factor)
         self.joint_controls = np.array([self.model.actuator(j.name).id for j in arm.joints])
+        self._first = int(self.joint_controls[0])
         self.finger_addresses = [int(self.model.joint(f"finger_{s}").qposadr[0]) for s in ("left", "right")]
+        smoothing_s = nominal_plant(arm).smoothing_s
+        self._smoothing = Smoothing(smoothing_s, rig.physics_s) if smoothing_s else None
+        self._joint_targets = np.zeros(6)
+
+    def rest_at(self, q_rad: Sequence[float]) -> None:
+        """Let the servos have been asked for these joints for long.  (6,)"""
+        self.data.ctrl[self._first : self._first + 6] = q_rad
+        self._joint_targets[:] = q_rad
+        if self._smoothing is not None:
+            self._smoothing.seat(self._joint_targets)
+
+    def aim(self, q_rad: Vec6) -> None:
+        """Let the servos be asked for joints from now on, smoothed as this arm does it.  (6,)"""
+        if self._smoothing is None:
+            self.data.ctrl[self._first : self._first + 6] = q_rad
+        else:
+            if self.stop_speed_rad_s is not None:
+                self._smoothing.seat(self.data.ctrl[self.joint_controls])
+            self._joint_targets[:] = q_rad
+        self.stop_speed_rad_s = None
 
     def advance(self) -> None:
         """One tick: drives, then physics."""
@@ -92,9 +114,18 @@ class TwinWorld:
         if self.stop_speed_rad_s is not None:
             self._ramp_down(self.stop_speed_rad_s)
         self.table.drive(self.data, self.digital_out)
-        self.step_physics(self.model, self.data, self.n_substeps)
+        if self._smoothing is not None and self.stop_speed_rad_s is None:
+            self._step_smoothed(self._smoothing)
+        else:
+            self.step_physics(self.model, self.data, self.n_substeps)
         if self.after_tick is not None:
             self.after_tick()
+
+    def _step_smoothed(self, smoothing: Smoothing) -> None:
+        set_point = self.data.ctrl[self._first : self._first + 6]
+        for _ in range(self.n_substeps):
+            set_point[:] = smoothing.step(self._joint_targets)
+            self.step_physics(self.model, self.data, 1)
 
     def limit_grip(self, force_n: float) -> None:
         """Let the hand press with so much at most (N)."""
@@ -130,7 +161,7 @@ class TwinWorld:
             data.qpos[address : address + 3] = (*standing.position_m, height)
             data.qpos[address + 3 : address + 7] = (np.cos(standing.yaw_rad / 2), 0, 0, np.sin(standing.yaw_rad / 2))
         data.qpos[:6] = q_rad
-        data.ctrl[self.joint_controls] = q_rad
+        self.rest_at(q_rad)
         for address in self.finger_addresses:
             data.qpos[address] = tool.stroke_m / 2
         self.opening_asked_m = self.opening_goal_m = tool.stroke_m
@@ -189,8 +220,6 @@ class TwinArm:
             fingers[0], fingers[1], speeds[0], speeds[1],
         )  # fmt: skip
         self._has_object = False
-        first = int(world.joint_controls[0])
-        self._joint_controls = data.ctrl[first : first + 6]
 
     def connect(self) -> None:
         """Take the arm; nothing moves."""
@@ -239,8 +268,7 @@ class TwinArm:
         if not self._is_connected:
             raise NotEngagedError("twin arm: expected connect() before write(); nothing moved")
         world = self._world
-        world.stop_speed_rad_s = None
-        self._joint_controls[:] = command.q_rad
+        world.aim(command.q_rad)
         grip = command.grip
         world.opening_goal_m = grip.opening_m
         world.grip_speed_m_s = grip.speed_m_s

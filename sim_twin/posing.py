@@ -66,7 +66,7 @@ def pose_world(
         position_m, quat = things[cylinder.name]
         data.qpos[address : address + N_THING] = (*position_m, *quat)
     data.qpos[:6] = q_rad
-    data.ctrl[world.joint_controls] = q_rad
+    world.rest_at(q_rad)
     for address in world.finger_addresses:
         data.qpos[address] = opening_m / 2
     data.qvel[:] = 0.0

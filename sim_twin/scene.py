@@ -17,16 +17,12 @@ from robot.description import (
     GRIP_SOLIMP,
     GRIP_SOLREF,
     OBJECT_CONTACT,
-    arm_spec,
 )
-from robot.servo import lag_s
+from sim_twin.fitted import add_servos, fitted_spec
 from sim_twin.names import on_table
 
 __all__ = ["build_scene", "leaf_names"]
 
-# Nm/rad. Droop stays under 0.5 mm with the tool's weight compensated; a servo three times as stiff makes a carried
-# object creep 2 mm, because implicitfast changes the velocity step after the contacts were solved.
-SERVO_STIFFNESS = (6_000.0, 6_000.0, 6_000.0, 1_200.0, 1_200.0, 1_200.0)
 FINGER_STIFFNESS = 6_000.0  # N/m
 _BOX = mujoco.mjtGeom.mjGEOM_BOX
 _CYLINDER = mujoco.mjtGeom.mjGEOM_CYLINDER
@@ -45,7 +41,7 @@ _LOOK = {"contype": 0, "conaffinity": 0, "mass": 0, "group": 1}
 
 def build_scene(arm: ArmConfig, scenario: Scenario, *, physics_s: float, tick_s: float) -> mujoco.MjSpec:
     """Return the whole world: arm, gripper, table, buttons, boxes, lids, cylinders, actuators and sensors."""
-    spec = arm_spec(arm)
+    spec = fitted_spec(arm)
     spec.modelname = f"{arm.name}_{scenario.name}"
     _set_options(spec, physics_s)
     _add_surroundings(spec, scenario)
@@ -55,7 +51,7 @@ def build_scene(arm: ArmConfig, scenario: Scenario, *, physics_s: float, tick_s:
         _add_box(spec, box, scenario.table.height_m)
     for cylinder in scenario.cylinders:
         _add_cylinder(spec, cylinder)
-    _add_servos(spec, arm, physics_s, tick_s)
+    add_servos(spec, arm, physics_s=physics_s, tick_s=tick_s)
     _add_grip(spec, arm)
     spec.add_sensor(
         name="tool_force", type=mujoco.mjtSensor.mjSENS_CONTACT, objtype=mujoco.mjtObj.mjOBJ_XBODY, objname="tool",
@@ -215,27 +211,6 @@ def _add_cylinder(spec: mujoco.MjSpec, cylinder: Cylinder) -> None:
         mass=cylinder.mass_kg, friction=[cylinder.friction, 0.005, 0.0001], condim=3, rgba=[*cylinder.colour, 1],
         solref=GRIP_SOLREF, solimp=GRIP_SOLIMP, contype=contype, conaffinity=conaffinity,
     )  # fmt: skip
-
-
-def _add_servos(spec: mujoco.MjSpec, arm: ArmConfig, physics_s: float, tick_s: float) -> None:
-    """Position servos; torque limits from the file.
-
-    A ramp is trailed by kd / kp, plus the dead time, plus half a tick because set-points come in steps: kd is chosen so
-    that the sum is robot.servo.lag_s.
-    """
-    servo = arm.servo
-    lag = lag_s(lookahead_s=servo.lookahead_s, gain=servo.gain, dead_time_s=servo.dead_time_s)
-    lag -= servo.dead_time_s + tick_s / 2
-    n_delay = round(servo.dead_time_s / physics_s)
-    for joint, kp in zip(arm.joints, SERVO_STIFFNESS, strict=True):
-        actuator = spec.add_actuator(
-            name=joint.name, trntype=mujoco.mjtTrn.mjTRN_JOINT, target=joint.name,
-            forcerange=[-joint.torque_nm, joint.torque_nm], forcelimited=mujoco.mjtLimited.mjLIMITED_TRUE,
-        )  # fmt: skip
-        actuator.set_to_position(kp=kp, kv=kp * lag)
-        if n_delay:
-            actuator.nsample = n_delay
-            actuator.delay = n_delay * physics_s
 
 
 def _add_grip(spec: mujoco.MjSpec, arm: ArmConfig) -> None:

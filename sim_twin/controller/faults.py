@@ -33,6 +33,9 @@ Torque: TypeAlias = Annotated[float, msgspec.Meta(ge=-300.0, le=300.0)]
 Torques: TypeAlias = tuple[Torque, Torque, Torque, Torque, Torque, Torque]
 Deviation: TypeAlias = Annotated[float, msgspec.Meta(ge=0.0, le=0.5)]
 OffNominal: TypeAlias = Annotated[float, msgspec.Meta(ge=0.0, le=100.0)]
+Friction: TypeAlias = Annotated[float, msgspec.Meta(ge=0.0, le=300.0)]
+Frictions: TypeAlias = tuple[Friction, Friction, Friction, Friction, Friction, Friction]
+Gain: TypeAlias = Annotated[float, msgspec.Meta(ge=0.1, le=10.0)]
 Share: TypeAlias = Annotated[float, msgspec.Meta(ge=0.0, le=1.0)]
 Whole: TypeAlias = Annotated[int, msgspec.Meta(ge=0, le=(1 << 63) - 1)]
 Bits: TypeAlias = Annotated[int, msgspec.Meta(ge=0, lt=1 << N_DIGITAL)]
@@ -67,6 +70,7 @@ class Faults:
             "bias": self.bias,
             "calibrate": self.calibrate,
             "delay": self.delay_links,
+            "drag": self.drag,
             "drop": self.drop_links,
             "estop": lambda: self._happen(Event.ROBOT_ESTOP),
             "estop_release": lambda: self._happen(Event.ROBOT_ESTOP_RELEASED),
@@ -88,6 +92,7 @@ class Faults:
             "refuse": self.refuse_links,
             "remote": self.remote_control,
             "reserve": self.reserve,
+            "servo": self.servo,
             "safeguard_close": lambda: self._happen(Event.SAFEGUARD_CLOSED),
             "safeguard_open": lambda: self._happen(Event.SAFEGUARD_OPENED),
             "safeguard_reset": lambda: self._happen(Event.SAFEGUARD_RESET),
@@ -198,6 +203,18 @@ class Faults:
     def payload(self, kg: float = 0.0) -> None:
         """Let so much more hang on the flange than the controller was told; 0 ends it."""
         self._robot.machine.drive.hang(kg)
+
+    def drag(self, nm: Frictions | None = None, nm_s: Frictions | None = None) -> None:
+        """Let joints drag: by so much whenever they move, and by so much more at 1 rad/s; nothing ends it."""
+        drive = self._robot.machine.drive
+        drive.hidden.drag(nm or (0.0,) * 6, nm_s or (0.0,) * 6)
+        drive.refresh()
+
+    def servo(self, stiffness: Gain = 1.0, damping: Gain = 1.0) -> None:
+        """Let the servos be so many times as stiff and as damped as they were built; 1 ends it."""
+        drive = self._robot.machine.drive
+        drive.hidden.retune(stiffness, damping)
+        drive.refresh()
 
     def calibrate(self, mm: OffNominal = 0.0, mrad: OffNominal = 0.0) -> Answer:
         """Let the controller's Denavit-Hartenberg rows differ from nominal by as much, each by chance; 0 ends it.

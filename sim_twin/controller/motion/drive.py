@@ -10,6 +10,7 @@ from sim_twin.controller.motion.actuation import BRAKE_NM, BRAKE_SOLIMP, HOLD_NM
 from sim_twin.controller.motion.contact import ContactWatch
 from sim_twin.controller.motion.core import MotionCore
 from sim_twin.controller.motion.feeling import Feeling
+from sim_twin.controller.motion.hidden import Hidden
 from sim_twin.controller.motion.kinematics import ArmKinematics, KinematicsError, dh_rows
 from sim_twin.controller.motion.limits import (
     Asked,
@@ -27,7 +28,6 @@ from sim_twin.controller.motion.poses import Array, vec6
 from sim_twin.controller.motion.setpoint import SLICE_S
 from sim_twin.controller.motion.stopping import stop_path
 from sim_twin.controller.motion.wrench import (
-    GRAVITY_M_S2,
     NM_PER_A,
     ForceSensor,
 )
@@ -59,6 +59,7 @@ class TwinDrive:
     Attributes:
         motions: What programs move the arm with.
         measured: After the last slice.
+        hidden: What of the arm is not as anybody knows it.
         contact: Whether the tool met something (tool_contact).
         limits: Held from the next slice on.
         is_braked: The joints are locked and the servos have no power.
@@ -78,8 +79,7 @@ class TwinDrive:
         self.limits = limits or default_limits(world.arm)
         model, data = world.model, world.data
         self._controls = world.joint_controls
-        self._gains = model.actuator_gainprm[self._controls].copy()
-        self._biases = model.actuator_biasprm[self._controls].copy()
+        self.hidden = Hidden(model, self._controls)
         self._lag_s = servo_lag_s(model, int(self._controls[0]), tick_s=world.tick_s)
         self._sensor = ForceSensor(model, (world.arm.tool.mass_kg, np.array(world.arm.tool.com_m)))
         self.motions = Motions(
@@ -120,10 +120,16 @@ class TwinDrive:
         """Give the servos power where the joints are and release the brakes."""
         model = self.world.model
         self._give_servos()
-        model.dof_frictionloss[:6] = 0.0
+        model.dof_frictionloss[:6] = self.hidden.friction_nm
         self.is_braked = False
         self._feeling.begin(self.world.data.qvel[:6].copy())
         self._seat()
+
+    def refresh(self) -> None:
+        """Let what has changed of the hidden arm be felt at once, where the servos have power."""
+        if not self.is_braked:
+            self.world.model.dof_frictionloss[:6] = self.hidden.friction_nm
+            self._give_servos()
 
     def put_torque(self, torque_nm: Sequence[float] | Array) -> None:
         """Move the joints by torques in this slice, beside what carries their weight; afterwards they are held.  (6,)
@@ -158,8 +164,8 @@ class TwinDrive:
 
     def _give_servos(self) -> None:
         model = self.world.model
-        model.actuator_gainprm[self._controls] = self._gains
-        model.actuator_biasprm[self._controls] = self._biases
+        model.actuator_gainprm[self._controls] = self.hidden.gains
+        model.actuator_biasprm[self._controls] = self.hidden.biases
         self._is_compliant = False
 
     def _seat(self, moving_rad_s: Array | None = None) -> None:
@@ -205,7 +211,7 @@ class TwinDrive:
             raise ValueError(f"payload: expected 0 to {MOST_EXTRA_KG:g} kg more, got {extra_kg}")
         tool = self.world.arm.tool
         self._sensor.hang((tool.mass_kg + extra_kg, np.array(tool.com_m)))
-        self.world.data.xfrc_applied[self.world.model.body("tool").id, 2] = -GRAVITY_M_S2 * extra_kg
+        self.hidden.carry(extra_kg)
 
     @property
     def payload(self) -> tuple[float, Array]:

@@ -1,0 +1,136 @@
+"""What a session holds of an arm's ticks, cut into pieces that a twin can be compared with. Pure."""
+
+from collections.abc import Iterable
+
+import msgspec
+import numpy as np
+from numpy.typing import NDArray
+
+from robot.messages import ArmCommand, ArmMode, ArmState
+
+__all__ = ["Piece", "TickRow", "pieces_of", "rows_of"]
+
+Array = NDArray[np.float64]
+PIECE_S, LEAST_S = 3.0, 0.8
+TOUCH_N = 8.0
+"""A force on the tool that is so much off its middle is a touch: the twin alone does not know of it."""
+STILL_RAD = 1e-9
+N_START = 9
+STAND_S = 0.1
+
+
+class TickRow(msgspec.Struct, frozen=True, kw_only=True):
+    """One tick: what was measured, and what was asked for then."""
+
+    state: ArmState
+    command: ArmCommand
+
+
+class Piece(msgspec.Struct, frozen=True, kw_only=True, eq=False):
+    """A span of ticks without a gap, in which the arm moved freely. Arrays have a row for each tick."""
+
+    tick_s: float
+    stamp_s: float
+    """Of the first tick, by the arm's clock."""
+    asked_rad: Array
+    """(n, 6), commanded at the tick; acts until the next."""
+    q_rad: Array
+    """(n, 6), measured at the tick, before its command."""
+    qd_rad_s: Array
+    tcp_m: Array
+    """(n, 3)"""
+    tcp_quat: Array
+    """(n, 4)"""
+    force_n: Array
+    """(n, 3)"""
+    opening_m: float
+
+    @property
+    def n(self) -> int:
+        """Ticks."""
+        return len(self.q_rad)
+
+    def start(self) -> tuple[Array, Array]:
+        """Return joints and their speeds at the first tick, noise lessened by those after it.  () -> (6,), (6,)"""
+        n_stand = round(STAND_S / self.tick_s)
+        if self.n > n_stand and float(np.abs(np.diff(self.asked_rad[:n_stand], axis=0)).max()) < STILL_RAD:
+            still = self.q_rad[:n_stand]
+            if float(np.abs(still[-1] - still[0]).max()) < 1e-3:
+                return still.mean(axis=0), np.zeros(6)
+        t = self.tick_s * np.arange(N_START)
+        curve = np.polynomial.polynomial.polyfit(t, self.q_rad[:N_START], 2)
+        return curve[0], curve[1]
+
+
+def rows_of(messages: Iterable[ArmState | ArmCommand | None]) -> list[list[TickRow]]:
+    """Pair measurements and commands, in runs that nothing breaks.
+
+    Args:
+        messages: measurements and sent commands in their order; None where the arm was placed anew or stopped.
+    """
+    runs: list[list[TickRow]] = [[]]
+    state: ArmState | None = None
+    for message in messages:
+        if message is None:
+            state = None
+            runs.append([])
+        elif isinstance(message, ArmState):
+            state = message
+        elif state is not None:
+            runs[-1].append(TickRow(state=state, command=message))
+            state = None
+    return [run for run in runs if run]
+
+
+def pieces_of(rows: list[TickRow], *, tick_s: float) -> list[Piece]:
+    """Cut a run into pieces of a few seconds: no gap in it, nothing touched, nothing in the hand."""
+    pieces: list[Piece] = []
+    for run in _unbroken(rows, tick_s):
+        middle_n = np.median(np.array([row.state.tcp_force_n for row in run]), axis=0)
+        for free in _free(run, middle_n):
+            n_pieces = max(1, round(len(free) * tick_s / PIECE_S))
+            for part in np.array_split(np.arange(len(free)), n_pieces):
+                if len(part) * tick_s >= LEAST_S:
+                    pieces.append(_piece(free[part[0] : part[-1] + 1], tick_s))
+    return pieces
+
+
+def _unbroken(rows: list[TickRow], tick_s: float) -> list[list[TickRow]]:
+    """Cut where measurements are missing or the arm does not run."""
+    runs: list[list[TickRow]] = [[]]
+    for row in rows:
+        before = runs[-1][-1] if runs[-1] else None
+        apart_s = 0.0 if before is None else (row.state.stamp_ns - before.state.stamp_ns) * 1e-9
+        if row.state.mode is not ArmMode.RUNNING or apart_s > 1.5 * tick_s or apart_s < 0.0:
+            runs.append([])
+        if row.state.mode is ArmMode.RUNNING:
+            runs[-1].append(row)
+    return [run for run in runs if run]
+
+
+def _free(run: list[TickRow], middle_n: Array) -> list[list[TickRow]]:
+    """Cut out where something is touched or held."""
+    parts: list[list[TickRow]] = [[]]
+    for row in run:
+        off_n = float(np.abs(np.subtract(row.state.tcp_force_n, middle_n)).max())
+        if off_n > TOUCH_N or row.state.grip.has_object:
+            if parts[-1]:
+                parts.append([])
+        else:
+            parts[-1].append(row)
+    return [part for part in parts if part]
+
+
+def _piece(rows: list[TickRow], tick_s: float) -> Piece:
+    states = [row.state for row in rows]
+    return Piece(
+        tick_s=tick_s,
+        stamp_s=states[0].stamp_ns * 1e-9,
+        asked_rad=np.array([row.command.q_rad for row in rows]),
+        q_rad=np.array([s.q_rad for s in states]),
+        qd_rad_s=np.array([s.qd_rad_s for s in states]),
+        tcp_m=np.array([s.tcp_position_m for s in states]),
+        tcp_quat=np.array([s.tcp_quat for s in states]),
+        force_n=np.array([s.tcp_force_n for s in states]),
+        opening_m=float(np.mean([s.grip.opening_m for s in states])),
+    )
