@@ -68,7 +68,7 @@ def estimate(arm: ArmAlone, x0: Array, pieces: Sequence[Piece]) -> Estimate:
         pieces: at least one, of more than its beginning.
     """
     noise = _noise(pieces)
-    told, why = _told(_jacobian(arm, x0, pieces, noise), list(range(N_VALUES)))
+    told, why = _told(_jacobian(arm, x0, pieces, noise, is_quick=True), list(range(N_VALUES)))
     x = _fitted(arm, x0, told, [p.head(FEW_S) for p in pieces[:FEW]], noise, closely=ROUGHLY)
     noise = np.maximum(LEAST_NOISE_RAD, joint_errors(arm, x, pieces).std(axis=0))
     x = _fitted(arm, x, told, pieces, noise, closely=CLOSELY)
@@ -129,10 +129,16 @@ def _residuals(arm: ArmAlone, x: Array, pieces: Sequence[Piece], noise: Array) -
     return np.concatenate([(arm.joints(x, p) - p.q_rad)[:, n_burn:] for p in pieces], axis=1) / noise
 
 
-def _jacobian(arm: ArmAlone, x: Array, pieces: Sequence[Piece], noise: Array) -> Array:
+def _jacobian(
+    arm: ArmAlone, x: Array, pieces: Sequence[Piece], noise: Array, *, is_quick: bool = False
+) -> Array:  # fmt: skip
     """Return how joints change with each value, between both sides where bounds leave room.  () -> (n, 6, N_VALUES)"""
     up = np.minimum(x + _STEPS, _BOUNDS[:, 1])
     down = np.maximum(x - _STEPS, _BOUNDS[:, 0])
+    if is_quick:
+        one = np.concatenate([np.tile(x, (N_VALUES, 1)) + np.diag(up - x), x[None]])
+        r = _residuals(arm, one, pieces, noise)
+        return np.moveaxis((r[:-1] - r[-1]) / (up - x)[:, None, None], 0, -1)
     both = np.tile(x, (2 * N_VALUES, 1))
     both[np.arange(N_VALUES), np.arange(N_VALUES)] = up
     both[N_VALUES + np.arange(N_VALUES), np.arange(N_VALUES)] = down
