@@ -42,8 +42,10 @@ class FittedPlant(Section, frozen=True, kw_only=True):
     smoothing_s: Smoothing = 0.0
     """What of it is the smoothing of commands, two equal first-order stages, before the servos."""
     stiffness_nm_rad: tuple[Stiffness, Stiffness, Stiffness, Stiffness, Stiffness, Stiffness]
-    friction_nm: tuple[Friction, Friction, Friction, Friction, Friction, Friction] = (0.0,) * 6
+    friction_nm: tuple[Friction, Friction, Friction, Friction, Friction, Friction] = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     """Dry friction; what grows with speed is in the lag."""
     payload_kg: Payload = 0.0
     """In the hand beside the tool's mass, and not compensated."""
-    rows: tuple[RowOff, RowOff, RowOff, RowOff, RowOff, RowOff] = (RowOff(),) * 6
+    rows: tuple[RowOff, RowOff, RowOff, RowOff, RowOff, RowOff] = (
+        RowOff(), RowOff(), RowOff(), RowOff(), RowOff(), RowOff(),
+    )  # fmt: skip

@@ -1,4 +1,4 @@
-"""`autotelic twin`: look at the simulated table."""
+"""`autotelic twin`: look at the simulated table, and fit it to an arm."""
 
 import math
 import os
@@ -9,6 +9,7 @@ import typer
 from typer import Typer
 
 from config.errors import ConfigError
+from sim_twin.fitting.command import fit
 
 if TYPE_CHECKING:
     from sim_twin.plant import TwinPlant
@@ -17,7 +18,9 @@ __all__ = ["app"]
 
 N_OUTPUTS = 16
 
-app = Typer(no_args_is_help=True, help="Look at the simulated table: a picture, or its model as MJCF.")
+app = Typer(no_args_is_help=True, help="Look at the simulated table, or fit the twin to sessions of an arm.")
+
+app.command()(fit)
 
 ScenarioOption = Annotated[str, typer.Option("--scenario", "-s", help="A shipped scenario's name or a file.")]
 RigOption = Annotated[str, typer.Option("--rig", "-r", help="A shipped rig's name or a file.")]

@@ -13,12 +13,28 @@ from config.fitted import FittedPlant
 from robot.description import arm_spec
 from robot.servo import lag_s
 
-__all__ = ["SERVO_STIFFNESS", "JointServo", "Smoothing", "add_servos", "fitted_spec", "joint_servos", "nominal_plant"]
+__all__ = [
+    "HARD_FRICTION",
+    "LEAST_LAG_S",
+    "SERVO_STIFFNESS",
+    "SOLVED",
+    "JointServo",
+    "Smoothing",
+    "add_servos",
+    "fitted_spec",
+    "joint_servos",
+    "nominal_plant",
+]
 
 Array = NDArray[np.float64]
 # Nm/rad. Droop stays under 0.5 mm with the tool's weight compensated; a servo three times as stiff makes a carried
 # object creep 2 mm, because implicitfast changes the velocity step after the contacts were solved.
 SERVO_STIFFNESS = (6_000.0, 6_000.0, 6_000.0, 1_200.0, 1_200.0, 1_200.0)
+HARD_FRICTION = (0.9999, 0.9999)
+"""A joint that sticks stands: MuJoCo's own dry friction creeps in proportion to the load."""
+SOLVED = (1e-10, 100)
+"""Tolerance and iterations with which that is solved for: with the scene's own a joint stuck or slid by chance, and was
+0.4 mrad elsewhere for 1 g more in the hand."""
 LEAST_LAG_S = 5e-4
 """Of a servo behind delay and smoothing."""
 WHOLE = 1e-9
@@ -61,7 +77,9 @@ def nominal_plant(arm: ArmConfig) -> FittedPlant:
         return arm.fitted
     servo = arm.servo
     lag = lag_s(lookahead_s=servo.lookahead_s, gain=servo.gain, dead_time_s=servo.dead_time_s)
-    return FittedPlant(lag_s=(lag,) * 6, dead_time_s=servo.dead_time_s, stiffness_nm_rad=SERVO_STIFFNESS)
+    return FittedPlant(
+        lag_s=(lag, lag, lag, lag, lag, lag), dead_time_s=servo.dead_time_s, stiffness_nm_rad=SERVO_STIFFNESS
+    )
 
 
 def joint_servos(arm: ArmConfig, tick_s: float) -> tuple[JointServo, ...]:
@@ -79,9 +97,12 @@ def joint_servos(arm: ArmConfig, tick_s: float) -> tuple[JointServo, ...]:
 def add_servos(spec: mujoco.MjSpec, arm: ArmConfig, *, physics_s: float, tick_s: float) -> None:
     """Add position servos; torque limits from the file."""
     fitted = arm.fitted is not None
+    servos = joint_servos(arm, tick_s)
     dead_time_s = nominal_plant(arm).dead_time_s
+    if any(servo.friction_nm for servo in servos):
+        spec.option.tolerance, spec.option.iterations = SOLVED
     n_delay = math.ceil(dead_time_s / physics_s - WHOLE) if fitted else round(dead_time_s / physics_s)
-    for joint, servo in zip(arm.joints, joint_servos(arm, tick_s), strict=True):
+    for joint, servo in zip(arm.joints, servos, strict=True):
         actuator = spec.add_actuator(
             name=joint.name, trntype=mujoco.mjtTrn.mjTRN_JOINT, target=joint.name,
             forcerange=[-joint.torque_nm, joint.torque_nm], forcelimited=mujoco.mjtLimited.mjLIMITED_TRUE,
@@ -89,6 +110,7 @@ def add_servos(spec: mujoco.MjSpec, arm: ArmConfig, *, physics_s: float, tick_s:
         actuator.set_to_position(kp=servo.stiffness_nm_rad, kv=servo.damping_nm_s_rad)
         if servo.friction_nm:
             spec.joint(joint.name).frictionloss = servo.friction_nm
+            spec.joint(joint.name).solimp_friction[:2] = HARD_FRICTION
         if n_delay:
             actuator.nsample = n_delay
             actuator.delay = dead_time_s if fitted else n_delay * physics_s

@@ -51,7 +51,7 @@ class Faults:
 
     Args:
         robot: The robot.
-        wires: Its ports.
+        wires: Its ports; None where it has none.
         ticks: What its slices cost.
         seed: Of the noise.
 
@@ -59,7 +59,7 @@ class Faults:
         is_frozen: Ports and physics stand still.
     """
 
-    def __init__(self, robot: VirtualRobot, wires: Wires, ticks: TickTimes, *, seed: int = 0) -> None:
+    def __init__(self, robot: VirtualRobot, wires: Wires | None, ticks: TickTimes, *, seed: int = 0) -> None:
         self._robot, self._wires, self._ticks = robot, wires, ticks
         self._rng = np.random.default_rng([seed, 1])
         self.is_frozen = False
@@ -156,6 +156,8 @@ class Faults:
         strange = sorted(set(names or []) - input_fields(self._robot.machine.version).keys())
         if strange:
             raise ValueError(f"expected names of RTDE inputs, got {strange[0][:40]!r}")
+        if self._wires is None:
+            raise ValueError("expected a controller with ports, this one has none")
         self._wires.rtde.reserve(names or [])
 
     def remote_control(self, on: bool = True) -> None:
@@ -299,7 +301,7 @@ class Faults:
         return _told(self._robot.programs.handle(event))
 
     def _ports(self, number: int | None) -> list:
-        ports = self._wires.port_by_number
+        ports = {} if self._wires is None else self._wires.port_by_number
         if number is None:
             return list(ports.values())
         if number not in ports:

@@ -1,1 +1,1 @@
-"""The twin fitted to sessions of an arm: what of its servos, friction, payload and lengths they show, and how surely."""
+"""The twin fitted to sessions: what of an arm's servos, friction, payload and lengths they show, and how surely."""

@@ -12,7 +12,7 @@ from scipy.signal import lfilter
 
 from config.arm import ArmConfig
 from robot.description import arm_spec
-from sim_twin.fitted import LEAST_LAG_S, add_servos
+from sim_twin.fitted import HARD_FRICTION, LEAST_LAG_S, SOLVED, add_servos
 from sim_twin.fitting.stream import Piece
 from sim_twin.fitting.values import N_VALUES
 
@@ -81,9 +81,10 @@ class ArmAlone:
         mujoco.mj_setConst(model, self._data)
 
     def _control(self, x: Array, piece: Piece) -> Array:
-        asked = np.repeat(piece.asked_rad, self.n_steps, axis=0)
+        asked = np.repeat(np.concatenate([piece.lead_rad, piece.asked_rad]), self.n_steps, axis=0)
         _, dead_time, smoothing = x[18:21].tolist()
-        return delayed(smoothed(asked, smoothing, self.physics_s), dead_time / self.physics_s)
+        put = delayed(smoothed(asked, smoothing, self.physics_s), dead_time / self.physics_s)
+        return put[len(piece.lead_rad) * self.n_steps :]
 
     def _start(self, piece: Piece) -> Array:
         state = np.zeros(self._n_state)
@@ -130,7 +131,9 @@ def _compiled(arm: ArmConfig, *, tick_s: float, physics_s: float, opening_m: flo
     spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
     spec.option.impratio = 10.0
     spec.option.jacobian = mujoco.mjtJacobian.mjJAC_DENSE
-    spec.option.tolerance, spec.option.iterations = 1e-7, 30
+    spec.option.tolerance, spec.option.iterations = SOLVED
+    for joint in spec.joints:
+        joint.solimp_friction[:2] = HARD_FRICTION
     add_servos(spec, arm, physics_s=physics_s, tick_s=tick_s)
     for actuator in spec.actuators:  # what is late is made of the commands here
         actuator.nsample, actuator.delay = 0, 0.0

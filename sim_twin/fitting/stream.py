@@ -17,6 +17,7 @@ TOUCH_N = 8.0
 STILL_RAD = 1e-9
 N_START = 9
 STAND_S = 0.1
+LEAD_S = 0.5
 
 
 class TickRow(msgspec.Struct, frozen=True, kw_only=True):
@@ -34,6 +35,8 @@ class Piece(msgspec.Struct, frozen=True, kw_only=True, eq=False):
     """Of the first tick, by the arm's clock."""
     asked_rad: Array
     """(n, 6), commanded at the tick; acts until the next."""
+    lead_rad: Array
+    """(m, 6), commanded before, as far as is known and matters: smoothing and delay remember them."""
     q_rad: Array
     """(n, 6), measured at the tick, before its command."""
     qd_rad_s: Array
@@ -49,6 +52,12 @@ class Piece(msgspec.Struct, frozen=True, kw_only=True, eq=False):
     def n(self) -> int:
         """Ticks."""
         return len(self.q_rad)
+
+    def head(self, seconds: float) -> "Piece":
+        """Return its beginning."""
+        n = min(self.n, round(seconds / self.tick_s))
+        rows = ("asked_rad", "q_rad", "qd_rad_s", "tcp_m", "tcp_quat", "force_n")
+        return msgspec.structs.replace(self, **{name: getattr(self, name)[:n] for name in rows})
 
     def start(self) -> tuple[Array, Array]:
         """Return joints and their speeds at the first tick, noise lessened by those after it.  () -> (6,), (6,)"""
@@ -91,7 +100,8 @@ def pieces_of(rows: list[TickRow], *, tick_s: float) -> list[Piece]:
             n_pieces = max(1, round(len(free) * tick_s / PIECE_S))
             for part in np.array_split(np.arange(len(free)), n_pieces):
                 if len(part) * tick_s >= LEAST_S:
-                    pieces.append(_piece(free[part[0] : part[-1] + 1], tick_s))
+                    lead = free[max(0, part[0] - round(LEAD_S / tick_s)) : part[0]]
+                    pieces.append(_piece(free[part[0] : part[-1] + 1], lead, tick_s))
     return pieces
 
 
@@ -121,11 +131,12 @@ def _free(run: list[TickRow], middle_n: Array) -> list[list[TickRow]]:
     return [part for part in parts if part]
 
 
-def _piece(rows: list[TickRow], tick_s: float) -> Piece:
+def _piece(rows: list[TickRow], lead: list[TickRow], tick_s: float) -> Piece:
     states = [row.state for row in rows]
     return Piece(
         tick_s=tick_s,
         stamp_s=states[0].stamp_ns * 1e-9,
+        lead_rad=np.array([row.command.q_rad for row in lead]).reshape(-1, 6),
         asked_rad=np.array([row.command.q_rad for row in rows]),
         q_rad=np.array([s.q_rad for s in states]),
         qd_rad_s=np.array([s.qd_rad_s for s in states]),

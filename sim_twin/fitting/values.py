@@ -1,4 +1,4 @@
-"""What may be fitted of an arm: the values' names, units, bounds, and how far off they may be before anything is seen."""
+"""What may be fitted of an arm: values' names, units, bounds, and how far off they may be before anything is seen."""
 
 import msgspec
 import numpy as np
@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 
 from config.fitted import FittedPlant
 
-__all__ = ["N_VALUES", "VALUES", "Value", "plant_of", "vector_of"]
+__all__ = ["JOINTS", "N_VALUES", "VALUES", "Value", "plant_of", "vector_of"]
 
 Array = NDArray[np.float64]
 JOINTS = ("base", "shoulder", "elbow", "wrist_1", "wrist_2", "wrist_3")

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import mujoco
 
 from sim_twin.controller.motion.poses import Array, vec6
+from sim_twin.fitted import SOLVED
 
 __all__ = ["Hidden"]
 
@@ -49,6 +50,8 @@ class Hidden:
         if (dry < 0.0).any() or (viscous < 0.0).any():
             raise ValueError(f"friction: expected nothing below 0, got {dry.tolist()} and {viscous.tolist()}")
         self.friction_nm = dry
+        if dry.any():
+            self._model.opt.tolerance, self._model.opt.iterations = SOLVED
         self._model.dof_damping[:6] = viscous
 
     def retune(self, stiffness: float, damping: float) -> None:
