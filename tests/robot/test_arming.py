@@ -67,6 +67,7 @@ def test_a_latch_keeps_its_first_reason(arming):
     arming.latch("first")
     arming.latch("second")
     assert arming.state.reason == "first"
+    assert arming.reasons == ["first"]
     assert arming.n_latches == 1
     with pytest.raises(NotEngagedError, match="first"):
         arming.require_engaged()

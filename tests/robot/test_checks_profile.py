@@ -73,6 +73,16 @@ def test_a_step_that_loses_all_a_stop_may_passes_and_the_next_float_does_not(i, 
     assert reason(check_joint_acceleration(rest, rest, beyond, ENVELOPE)) is Reason.JOINT_ACCELERATION
 
 
+@pytest.mark.parametrize("sign", [-1.0, 1.0])
+def test_a_joint_that_turns_round_is_told_by_how_much_it_turned_too_hard(sign):
+    end = ENVELOPE.joints[0]
+    back, forth = -0.5 * sign * end.gain_rad, sign * end.stop_rad
+    now, before = with_joint((0.0,) * 6, 0, back), with_joint((0.0,) * 6, 0, -forth)
+    refusal = check_joint_acceleration(now, (0.0,) * 6, before, ENVELOPE)
+    assert reason(refusal) is Reason.JOINT_ACCELERATION
+    assert refusal.amount == pytest.approx(0.5 * end.gain_rad)
+
+
 @pytest.mark.parametrize("i", JOINTS)
 @pytest.mark.parametrize("sign", [-1.0, 1.0])
 def test_a_change_of_acceleration_at_a_stops_jerk_passes_and_the_next_float_does_not(i, sign):
