@@ -233,6 +233,7 @@ def check_scenario(scenario: Scenario, file: str) -> None:
         checker.need(is_high, f"buttons[{i}].height_m", f"at least {least_m:g}, cap and travel", f"{button.height_m:g}")
     for i, goal in enumerate(scenario.goals):
         _check_goal(goal, scenario, f"goals[{i}]", checker)
+    _check_arrivals(scenario, checker)
     _check_seen(scenario, checker)
     if scenario.workspace_m is not None:
         for axis, pair in enumerate(zip(*scenario.workspace_m, strict=True)):
@@ -278,6 +279,15 @@ def _check_distances(scenario: Scenario, checker: Checker) -> None:
     for i, name in enumerate(scenario.distances):
         checker.known(name, [*things, "table"], f"distances[{i}]", "an object or table")
     checker.unique(((f"distances[{i}]", name) for i, name in enumerate(scenario.distances)), "a distance")
+
+
+def _check_arrivals(scenario: Scenario, checker: Checker) -> None:
+    """Goals are numbered as they become known, so that a new one changes no other's number."""
+    starts = [goal.from_epoch for goal in scenario.goals]
+    checker.need(starts[0] == 0, "goals[0].from_epoch", "0: a goal that is known from the first epoch", f"{starts[0]}")
+    for i in range(1, len(starts)):
+        expected = f"at least {starts[i - 1]}, as of the goal before: those that become known later come later"
+        checker.need(starts[i] >= starts[i - 1], f"goals[{i}].from_epoch", expected, f"{starts[i]}")
 
 
 def _check_seen(scenario: Scenario, checker: Checker) -> None:

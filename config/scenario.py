@@ -119,6 +119,8 @@ class Goal(Section, frozen=True, kw_only=True):
     object: Name
     box: Name | None = None
     """For in_box: which box."""
+    from_epoch: Annotated[int, Meta(ge=0)] = 0
+    """Epoch from which the learner knows of it: before, it neither judges it nor can want it."""
 
 
 class RuleSpan(Section, frozen=True, kw_only=True):

@@ -4,13 +4,14 @@ Read it as the paper tells it: the goal selector chooses at each epoch, the sub-
 sub-goal's expert at each time step. What was achieved in an epoch stays achieved (latched) until the next reset.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import Any, Protocol
 
 import msgspec
 
 from config.learning import Experiment
-from learning.interfaces import Attempt, Experts, GoalState, Kept, Late, SubgoalSelector, TrialOutcome
+from learning.errors import LearningError
+from learning.interfaces import Attempt, Experts, GoalState, Grows, Kept, Late, SubgoalSelector, TrialOutcome
 from learning.looking import ways_to_look
 from learning.stopwatch import Stopwatch
 from robot.messages import Heading, Percept
@@ -144,21 +145,61 @@ class Agent:
         judge: GoalJudge,
         protocol: Experiment,
         stopwatch: Stopwatch | None = None,
+        arrivals: Sequence[int] = (),
     ) -> None:
+        """Put the layers together; they know the goals that are known in the first epoch.
+
+        Args:
+            goal_selector: chooses goals.
+            subgoal_selector: chooses sub-goals.
+            experts: move the arm.
+            judge: tells what was achieved.
+            protocol: how long epochs and trials are.
+            stopwatch: hears of every layer's time.
+            arrivals: the epoch from which each goal is known, in order; empty: all from the first.
+        """
+        self._arrivals = tuple(arrivals)
         self.goal_selector = goal_selector
         self.subgoal_selector = subgoal_selector
         self.experts = experts
         self.judge = judge
         self._protocol = protocol
         self._stopwatch = stopwatch or Stopwatch()
-        self._nothing: GoalState = (False,) * judge.n_goals
+        if self._arrivals:
+            self._let_judge_know(self._n_known(0))
         self.witness: Witness | None = None
         """Hears of everything."""
 
     @property
     def n_goals(self) -> int:
-        """How many goals there are."""
+        """How many goals are known."""
         return self.judge.n_goals
+
+    def meet_goals(self, epoch: int) -> tuple[int, ...]:
+        """Take in the goals that become known in an epoch that is about to begin, and return them.
+
+        Raises:
+            LearningError: a layer cannot take in any.
+        """
+        n_before, n_goals = self.n_goals, self._n_known(epoch)
+        if n_goals <= n_before:
+            return ()
+        for layer in (self.goal_selector, self.subgoal_selector, self.experts):
+            if not isinstance(layer, Grows):
+                raise LearningError(f"expected layers that take in new goals, {type(layer).__name__} does not")
+            layer.grow(n_goals)
+        self._let_judge_know(n_goals)
+        return tuple(range(n_before, n_goals))
+
+    def _nothing(self) -> GoalState:
+        return (False,) * self.n_goals
+
+    def _n_known(self, epoch: int) -> int:
+        return sum(start <= epoch for start in self._arrivals) if self._arrivals else self.n_goals
+
+    def _let_judge_know(self, n_goals: int) -> None:
+        assert isinstance(self.judge, Grows), "who is told of arrivals judges by a scenario"
+        self.judge.grow(n_goals)
 
     def choose_goal(self) -> int:
         """Return the goal of the next epoch."""
@@ -191,15 +232,18 @@ class Agent:
         return record
 
     def state_dict(self) -> dict[str, Any]:
-        """Return everything learnt and the generators' states."""
-        return {
+        """Return everything learnt and the generators' states, and how many goals are known while not all are."""
+        known = {"n_goals": self.n_goals} if self.n_goals < len(self._arrivals) else {}
+        return known | {
             "goal_selector": self.goal_selector.state_dict(),
             "subgoal_selector": self.subgoal_selector.state_dict(),
             "experts": self.experts.state_dict(),
         }
 
     def load_state_dict(self, state: dict[str, Any]) -> None:
-        """Restore bit for bit."""
+        """Restore bit for bit, with as many goals known as then."""
+        if self._arrivals:
+            self._let_judge_know(state.get("n_goals", len(self._arrivals)))
         self.goal_selector.load_state_dict(state["goal_selector"])
         self.subgoal_selector.load_state_dict(state["subgoal_selector"])
         self.experts.load_state_dict(state["experts"])
@@ -325,7 +369,7 @@ class Agent:
         so was not achieved, as far as is known, and its trial was no fair try: it is no evidence against the skill, and
         no proof that something blocked it.
         """
-        end, came_about = scene.percept, self._nothing
+        end, came_about = scene.percept, self._nothing()
         for way in ways_to_look(station.spec):
             if self.judge.known(scene.percept, since_ns=end.stamp_ns)[subgoal]:
                 break
@@ -354,7 +398,7 @@ class Agent:
             now = tuple(new if is_known else old for new, old, is_known in zip(now, before, known, strict=True))
         scene.percept = percept
         if now == before:
-            return self._nothing
+            return self._nothing()
         scene.holding = now
         scene.latched = tuple(was_so or is_so for was_so, is_so in zip(scene.latched, now, strict=True))
         return tuple(is_so and not was_so for is_so, was_so in zip(now, before, strict=True))

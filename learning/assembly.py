@@ -84,7 +84,8 @@ class RobotLearner:
 def build_agent(resolved: Resolved, spec: StationSpec, *, seed: int, stopwatch: Stopwatch | None = None) -> Agent:
     """Return an agent that has learnt nothing yet. Its judge alone knows what the goals are about."""
     learning, scenario = resolved.learning, resolved.scenario
-    n_goals = len(scenario.goals)
+    arrivals = tuple(goal.from_epoch for goal in scenario.goals)
+    n_goals = arrivals.count(0)
     return Agent(
         goal_selector=GoalSelector(
             n_goals=n_goals,
@@ -99,11 +100,12 @@ def build_agent(resolved: Resolved, spec: StationSpec, *, seed: int, stopwatch: 
         judge=GoalJudge(scenario, spec),
         protocol=learning.experiment,
         stopwatch=stopwatch,
+        arrivals=arrivals if any(arrivals) else (),
     )
 
 
 def _experts(resolved: Resolved, spec: StationSpec, *, seed: int) -> Experts:
-    learning, n_goals = resolved.learning, len(resolved.scenario.goals)
+    learning, n_goals = resolved.learning, sum(goal.from_epoch == 0 for goal in resolved.scenario.goals)
     experts = ExpertSet(learning, spec, n_goals=n_goals, rng=named_generator(seed, "experts"))
     share = learning.expert.carried_out
     return experts if share == 1.0 else StrayingExperts(experts, spec, share=share, seed=seed)

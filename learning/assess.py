@@ -89,7 +89,7 @@ def assess(
         resolved = with_rig(resolved, rig)
     state, _ = folder.checkpoints.newest()
     epoch = max(0, state["n_done"] - 1) if rules_epoch is None else rules_epoch
-    n_goals, oracle = len(manifest.goals), rules_oracle(resolved)
+    n_goals, oracle = state["agent"].get("n_goals", len(manifest.goals)), rules_oracle(resolved)
     tests = [
         GoalTest(
             root_seed=manifest.seed if seed is None else seed,

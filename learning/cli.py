@@ -20,7 +20,7 @@ from learning.report import Run, load_run, load_runs
 from learning.report_files import write_report
 from learning.run_folder import RunFolder
 from learning.stopwatch import Stopwatch
-from learning.telling import explanation_table, profile_table, report_tables, score_table, summary_lines
+from learning.telling import explanation_table, not_known_yet, profile_table, report_tables, score_table, summary_lines
 from learning.wanted import Wanted
 from robot.stop_request import StopRequest
 
@@ -201,12 +201,21 @@ def explain(
     from learning.assess import beliefs_of  # brings torch, seconds that reports do not need
 
     folder = RunFolder(run)
-    goals = [goal.name for goal in folder.manifest().goals]
+    infos = folder.manifest().goals
+    goals = [goal.name for goal in infos]
     explanations = beliefs_of(folder)
+    unknown = not_known_yet(explanations, infos)
     if json:
-        typer.echo(msgspec.json.encode({"goals": goals, "explanations": explanations}).decode())
-    else:
-        Console().print(explanation_table(explanations, goals))
+        told = {
+            "goals": goals,
+            "explanations": explanations,
+            "not_known_yet": list(range(len(explanations), len(goals))),
+        }
+        typer.echo(msgspec.json.encode(told).decode())
+        return
+    Console().print(explanation_table(explanations, goals))
+    for line in unknown:
+        typer.echo(line)
 
 
 @_one_line_errors

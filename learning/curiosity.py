@@ -109,6 +109,10 @@ class Curiosity:
             self._probe = None
         return step
 
+    def wake(self) -> None:
+        """Be as curious as at first."""
+        self._interest = 1.0
+
     def take_in(self, finding: Finding, graph: Graph) -> None:
         """Remember surprises, and look anew at a goal whose needs were revised."""
         self._controls.take_in(finding, graph)

@@ -48,6 +48,10 @@ class Watcher(Protocol):
         """An evaluation is done."""
         ...
 
+    def goals_met(self, epoch: int, goals: Sequence[int]) -> None:
+        """Goals became known."""
+        ...
+
 
 class Plan(msgspec.Struct, frozen=True, kw_only=True):
     """What is to be run."""
@@ -56,6 +60,8 @@ class Plan(msgspec.Struct, frozen=True, kw_only=True):
     protocol: ExperimentConfig
     changes: tuple[int, ...]
     """Epochs at which the rules change; known here to time evaluations, never told to the agent."""
+    arrivals: tuple[int, ...] = ()
+    """Epochs at which goals become known; the agent meets them."""
 
 
 class _Due(msgspec.Struct, frozen=True, kw_only=True):
@@ -95,7 +101,7 @@ class Experiment:
         self._stopwatch = stopwatch or Stopwatch()
         self._when_kept = when_kept
         self._when_captured = when_captured
-        self._cases: dict[int, list[GoalState]] = {}
+        self._cases: dict[tuple[int, int], list[GoalState]] = {}
         self._waiting: deque[_Due] = deque()
         self._n_evaluation_rows = tables.n_rows("evaluations")
         """Rows written or on their way."""
@@ -139,6 +145,9 @@ class Experiment:
 
     def _run_epoch(self) -> None:
         epoch = self._n_done
+        met = self._agent.meet_goals(epoch)
+        if met:
+            self._watcher.goals_met(epoch, met)
         goal = self._agent.choose_goal()
         self._watcher.epoch_begins(epoch, goal)
         seed = reset_seed(self._plan.seed, epoch)
@@ -168,6 +177,7 @@ class Experiment:
             dense_for=protocol.dense_for,
             changes=self._plan.changes,
             n_epochs=protocol.epochs,
+            arrivals=self._plan.arrivals,
         )
         if not due:
             return
@@ -209,9 +219,9 @@ class Experiment:
             return None
         allowed: Allowed = lambda goal, state: oracle(goal, state, rules_epoch)  # noqa: E731
         era = max(change for change in (0, *self._plan.changes) if change <= rules_epoch)
-        if era not in self._cases:
-            self._cases[era] = reachable_states(allowed, n_goals)
-        states = self._cases[era]
+        if (era, n_goals) not in self._cases:
+            self._cases[era, n_goals] = reachable_states(allowed, n_goals)
+        states = self._cases[era, n_goals]
         return tuple((len(states), wrong) for wrong in graph_errors(predicted, allowed, states, n_goals))
 
     # --------------------------------------------------------------------------------------------------- checkpoints

@@ -40,13 +40,10 @@ class ExpertSet:
     """One utility model a goal, one forward model, one curiosity."""
 
     def __init__(self, config: LearningConfig, spec: StationSpec, *, n_goals: int, rng: np.random.Generator) -> None:
-        self._config = config.expert
+        self._config, self._spec = config.expert, spec
         self._scales_m = config.expert.scales_m
         streams = rng.spawn(n_goals + 2)
-        self._models = [
-            UtilityModel(config.expert, n_distances=spec.n_distances, n_states=spec.n_buttons, rng=stream)
-            for stream in streams[2:]
-        ]
+        self._models = [self._model(stream) for stream in streams[2:]]
         self._rng = streams[0]
         self._forward = make_forward_model(config.forward_model, spec, streams[1])
         n_inputs = len(self._models[0].weights)
@@ -58,6 +55,21 @@ class ExpertSet:
         self._candidates = Candidates(spec, config.actions)
         self._boredom = Boredom(n_inputs, height=config.expert.boredom, sigma=config.expert.boredom_sigma)
         self._begin(0, explore=False, is_by_model=True)
+
+    def _model(self, rng: np.random.Generator) -> UtilityModel:
+        spec = self._spec
+        return UtilityModel(self._config, n_distances=spec.n_distances, n_states=spec.n_buttons, rng=rng)
+
+    def grow(self, n_goals: int) -> None:
+        """Take in new goals, each with a model of its own that has seen nothing; the others stay as they are."""
+        # Not by spawning: how often a generator has spawned is no part of its state, and lost with a resume.
+        seeds = self._rng.integers(2**63, size=n_goals - len(self._models))
+        self._models += [self._model(np.random.default_rng(int(seed))) for seed in seeds]
+
+    def _resize(self, n_goals: int) -> None:
+        """Have so many models, for a state to be put into them."""
+        more = range(n_goals - len(self._models))
+        self._models = [*self._models[:n_goals], *(self._model(np.random.default_rng(0)) for _ in more)]
 
     def _begin(self, subgoal: int, *, explore: bool, is_by_model: bool) -> None:
         self._subgoal, self._is_learning, self._is_by_model = subgoal, explore, is_by_model
@@ -224,6 +236,7 @@ class ExpertSet:
 
     def load_state_dict(self, state: dict[str, Any]) -> None:
         """Restore bit for bit."""
+        self._resize(len(state["models"]))
         for model, loaded in zip(self._models, state["models"], strict=True):
             model.load_state_dict(loaded)
         self._forward.load_state_dict(state["forward"])

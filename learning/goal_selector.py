@@ -42,12 +42,12 @@ class GoalSelector:
         self._config = config
         self._subgoals = subgoals
         self._rng = rng
-        self._values = np.zeros(n_goals)
-        n_kept = max(2 * config.window, subgoals.competence_window)
-        self._cp = [deque[float](maxlen=n_kept) for _ in range(n_goals)]
-        self._results = [deque[float](maxlen=n_kept) for _ in range(n_goals)]
-        self._epochs = [deque[float](maxlen=config.window) for _ in range(n_goals)]
+        self._values = np.zeros(0)
+        self._cp: list[deque[float]] = []
+        self._results: list[deque[float]] = []
+        self._epochs: list[deque[float]] = []
         """What came of the newest epochs that had a goal."""
+        self._resize(n_goals)
 
     # ----------------------------------------------------------------------------------------------------- decide
 
@@ -86,6 +86,19 @@ class GoalSelector:
         if self._config.rearm:
             for goal in goals:
                 self._values[goal] = max(float(self._values.max()), self._config.rearm_value)
+
+    def grow(self, n_goals: int) -> None:
+        """Take in new goals: nothing was tried of them, and where the config arms goals again they are armed."""
+        new = range(len(self._values), n_goals)
+        self._resize(n_goals)
+        self.rearm(new)
+
+    def _resize(self, n_goals: int) -> None:
+        n_before, window = len(self._values), self._config.window
+        self._values = np.concatenate([self._values[:n_goals], np.zeros(max(0, n_goals - n_before))])
+        n_kept = max(2 * window, self._subgoals.competence_window)
+        for kept, maxlen in ((self._cp, n_kept), (self._results, n_kept), (self._epochs, window)):
+            kept[:] = [*kept[:n_goals], *(deque[float](maxlen=maxlen) for _ in range(n_goals - n_before))]
 
     def _credit(self, goal: int, *, predicted: float, result: float) -> None:
         expected = predicted if self._config.prediction == "expert_utility" else self.success(goal)
@@ -133,6 +146,7 @@ class GoalSelector:
 
     def load_state_dict(self, state: dict[str, Any]) -> None:
         """Restore bit for bit."""
+        self._resize(len(state["values"]))
         self._values = np.array(state["values"], dtype=float)
         kept_before = (*state["cp"], *state["results"], *state["epochs"])
         for kept, loaded in zip((*self._cp, *self._results, *self._epochs), kept_before, strict=True):

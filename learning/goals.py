@@ -43,11 +43,16 @@ class GoalJudge:
             GoalKind.IN_BOX: self._is_in_box,
         }
         self._tests = tuple((tests[goal.kind], goal) for goal in self._goals)
+        self._all_goals, self._all_tests = self._goals, self._tests
 
     @property
     def n_goals(self) -> int:
-        """How many goals there are."""
+        """How many goals are known."""
         return len(self._goals)
+
+    def grow(self, n_goals: int) -> None:
+        """Judge so many goals, the scenario's first ones, and know of no other."""
+        self._goals, self._tests = self._all_goals[:n_goals], self._all_tests[:n_goals]
 
     def achieved(self, percept: Percept) -> GoalState:
         """Return which goals hold now."""

@@ -46,18 +46,13 @@ class Graph:
     """A belief per goal, and what planning must know besides: skills, and which goals get lost again."""
 
     def __init__(self, *, n_goals: int, config: SubgoalSelection) -> None:
-        self.n_goals = n_goals
         self._config = config
-        self.beliefs = tuple(
-            Belief(
-                n_goals=n_goals,
-                goal=g,
-                max_literals=config.max_literals,
-                literal_cost=config.literal_cost,
-                false_positive=config.false_positive,
-            )
-            for g in range(n_goals)
-        )
+        self._begin(n_goals)
+
+    def _begin(self, n_goals: int) -> None:
+        """Believe nothing yet of so many goals."""
+        self.n_goals = n_goals
+        self.beliefs = tuple(self._prior(g, n_goals) for g in range(n_goals))
         self._skill = [1.0] * n_goals
         self._carried = np.zeros((n_goals, n_goals))
         self._lost = np.zeros((n_goals, n_goals))
@@ -71,6 +66,29 @@ class Graph:
         self._revisions = Revisions(self.beliefs)
         self._log = tuple(deque[Evidence](maxlen=N_EVIDENCE) for _ in range(n_goals))
         self._last: list[Evidence | None] = [None] * n_goals
+
+    def _prior(self, goal: int, n_goals: int) -> Belief:
+        config = self._config
+        return Belief(
+            n_goals=n_goals, goal=goal, max_literals=config.max_literals, literal_cost=config.literal_cost,
+            false_positive=config.false_positive,
+        )  # fmt: skip
+
+    def grow(self, n_goals: int) -> None:
+        """Take in new goals: the others keep what is believed of them, and may need the new ones, or their absence."""
+        n_before, self.n_goals = self.n_goals, n_goals
+        new = range(n_before, n_goals)
+        self.beliefs = (
+            *(belief.grown(n_goals) for belief in self.beliefs), *(self._prior(goal, n_goals) for goal in new)
+        )  # fmt: skip
+        self._skill += [1.0] * len(new)
+        more = (0, len(new))
+        self._carried, self._lost = (np.pad(counts, (more, more)) for counts in (self._carried, self._lost))
+        self._tried, self._reached = (np.pad(n, ((0, 0), more, more)) for n in (self._tried, self._reached))
+        self._fair = self._undone = None
+        self._revisions.grow(self.beliefs)
+        self._log = (*self._log, *(deque[Evidence](maxlen=N_EVIDENCE) for _ in new))
+        self._last += [None] * len(new)
 
     # ------------------------------------------------------------------------------------------------------ learn
 
@@ -269,6 +287,8 @@ class Graph:
 
     def load_state_dict(self, state: dict[str, Any]) -> None:
         """Restore bit for bit."""
+        if len(state["beliefs"]) != self.n_goals:
+            self._begin(len(state["beliefs"]))
         for belief, loaded in zip(self.beliefs, state["beliefs"], strict=True):
             belief.load_state_dict(loaded)
         self._skill = list(state["skill"])

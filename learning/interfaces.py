@@ -1,13 +1,13 @@
 """Words and doors inside the learning room."""
 
 from enum import StrEnum
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol, runtime_checkable
 
 import msgspec
 
 from robot.messages import Heading, Percept, StepResult
 
-__all__ = ["Attempt", "Experts", "GoalState", "Kept", "Late", "SubgoalSelector", "TrialOutcome"]
+__all__ = ["Attempt", "Experts", "GoalState", "Grows", "Kept", "Late", "SubgoalSelector", "TrialOutcome"]
 
 GoalState = tuple[bool, ...]
 """Which goals were achieved during the current epoch (latched), by goal index."""
@@ -62,6 +62,15 @@ class Kept(Protocol):
 
     def load_state_dict(self, state: dict[str, Any]) -> None:
         """Restore bit for bit."""
+        ...
+
+
+@runtime_checkable
+class Grows(Protocol):
+    """What takes in goals that become known while it learns, and keeps all that it knows of the others."""
+
+    def grow(self, n_goals: int) -> None:
+        """Know so many goals, the first ones of which are those that it knew."""
         ...
 
 

@@ -10,6 +10,7 @@ from learning.interfaces import GoalState
 from learning.rows import EvaluationRow, GoalRow, GraphRow
 
 __all__ = [
+    "AddedGoal",
     "Allowed",
     "Era",
     "EraSummary",
@@ -92,17 +93,25 @@ def eras(changes: Sequence[int], n_epochs: int) -> list[Era]:
 
 
 def due_evaluations(
-    n_done: int, *, every: int, dense_every: int, dense_for: int, changes: Sequence[int], n_epochs: int
+    n_done: int,
+    *,
+    every: int,
+    dense_every: int,
+    dense_for: int,
+    changes: Sequence[int],
+    n_epochs: int,
+    arrivals: Sequence[int] = (),
 ) -> list[int]:
     """Return under which epochs' rules to evaluate after n_done epochs; empty where nothing is due.
 
     At a change of rules both the old and the new are looked at, so that the drop is seen before anything is relearnt.
+    Where goals become known (arrivals) it is as dense as after a change.
     """
     if n_done == 0:
         return []
     if n_done in changes and n_done < n_epochs:
         return [n_done - 1, n_done]
-    since = [n_done - start for start in (0, *changes) if 0 < n_done - start <= dense_for]
+    since = [n_done - start for start in (0, *changes, *arrivals) if 0 < n_done - start <= dense_for]
     is_dense = any(elapsed % dense_every == 0 for elapsed in since)
     is_due = n_done % every == 0 or is_dense or n_done == n_epochs
     return [n_done - 1] if is_due else []
@@ -159,6 +168,17 @@ class EraSummary(msgspec.Struct, frozen=True, kw_only=True):
     """The same of those that succeeded alone."""
 
 
+class AddedGoal(msgspec.Struct, frozen=True, kw_only=True):
+    """What became of a goal that was not known from the first epoch."""
+
+    goal: int
+    from_epoch: int
+    mastered_after: int | None
+    """First of two evaluations running at which it was mastered, counted from when it became known."""
+    others_least_success: float | None
+    """Least success of a goal known before, at any evaluation since, up to the next change of rules or new goal."""
+
+
 class Summary(msgspec.Struct, frozen=True, kw_only=True):
     """A run in a few figures."""
 
@@ -172,6 +192,8 @@ class Summary(msgspec.Struct, frozen=True, kw_only=True):
     """Decisions while learning until every goal was learnt under the first rules."""
     choices_by_goal: tuple[int, ...]
     eras: tuple[EraSummary, ...]
+    added: tuple[AddedGoal, ...] = ()
+    """Goals that became known meanwhile."""
 
 
 def summarise(
@@ -183,6 +205,7 @@ def summarise(
     n_trials: int,
     changes: Sequence[int],
     optima: Sequence[Sequence[int | None]],
+    from_epochs: Sequence[int] = (),
 ) -> Summary:
     """Return the figures of a run from its rows.
 
@@ -194,6 +217,7 @@ def summarise(
         n_trials: Trials that an epoch has.
         changes: Epochs at which the rules changed.
         optima: Least trials of each goal, one sequence a set of rules; a run may not have come to all.
+        from_epochs: Epoch from which each goal is known; empty: all from the first.
     """
     n_epochs = len(goal_rows)
     spans = eras(changes, n_epochs) if n_epochs else []
@@ -216,6 +240,27 @@ def summarise(
         time_steps_to_all=None if learnt_at is None else sum(row.n_steps for row in goal_rows[:learnt_at]),
         choices_by_goal=tuple(sum(row.goal == goal for row in goal_rows) for goal in range(n_goals)),
         eras=parts,
+        added=tuple(
+            _added(goal, from_epochs, evaluation_rows, changes)
+            for goal, start in enumerate(from_epochs)
+            if 0 < start < n_epochs
+        ),
+    )
+
+
+def _added(goal: int, from_epochs: Sequence[int], rows: Sequence[EvaluationRow], changes: Sequence[int]) -> AddedGoal:
+    start = from_epochs[goal]
+    until = min((epoch for epoch in (*from_epochs, *changes) if epoch > start), default=None)
+    since = [row for row in rows if row.epoch > start]
+    marks = [(row.epoch - start, is_mastered(row)) for row in since if row.goal == goal]
+    others = [
+        row.success for row in since if from_epochs[row.goal] < start and (until is None or row.rules_epoch < until)
+    ]
+    return AddedGoal(
+        goal=goal,
+        from_epoch=start,
+        mastered_after=first_running(marks, running=2),
+        others_least_success=min(others, default=None),
     )
 
 

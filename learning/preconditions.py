@@ -122,6 +122,7 @@ class Belief:
     def __init__(
         self, *, n_goals: int, goal: int, max_literals: int, literal_cost: float, false_positive: float
     ) -> None:
+        self._goal, self._max_literals, self._literal_cost = goal, max_literals, literal_cost
         needs = tuple(conjunctions(n_goals, goal, max_literals))
         self._on = np.array([c.on for c in needs], dtype=np.int64)  # (h,)
         self._off = np.array([c.off for c in needs], dtype=np.int64)  # (h,)
@@ -138,6 +139,25 @@ class Belief:
         self._hits = np.zeros(len(needs))  # (h,)
         self._misses = np.zeros(len(needs))  # (h,)
         self._believe(self._prior.copy())
+
+    def grown(self, n_goals: int) -> "Belief":
+        """Return what is believed where there are so many goals; these are the first of them.
+
+        Of literals on new goals nothing is known: a conjunction with some has the probability of what else it says,
+        times exp(-cost) for each, as the prior has it, and the record of that.
+        """
+        new = Belief(
+            n_goals=n_goals, goal=self._goal, max_literals=self._max_literals, literal_cost=self._literal_cost,
+            false_positive=self._false_positive,
+        )  # fmt: skip
+        known = (1 << self._n_goals) - 1
+        index_of = {word: i for i, word in enumerate(self._words.tolist())}
+        at = [index_of[word] for word in (new._words & (known | known << WORD)).tolist()]  # (h',)
+        n_new = np.array([(word & ~(known | known << WORD)).bit_count() for word in new._words.tolist()])  # (h',)
+        weights = self.probabilities[at] * np.exp(-self._literal_cost * n_new)
+        new._hits, new._misses = self._hits[at], self._misses[at]
+        new._believe(weights / weights.sum())
+        return new
 
     def allows(self, situation: Situation) -> np.ndarray:
         """Return which conjunctions allow the goal in a situation.  () -> (h,)"""

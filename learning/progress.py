@@ -100,6 +100,10 @@ class Progress:
         self._steps.mark(now_s, self.n_steps)
         self._epochs.mark(now_s, self._n_done)
 
+    def goals_met(self, epoch: int, goals: Sequence[int]) -> None:
+        """Goals became known."""
+        self.say(f"epoch {epoch}: from now on {' and '.join(self._goals[goal] for goal in goals)} can be wanted")
+
     def evaluated(self, rows: Sequence[EvaluationRow]) -> None:
         """An evaluation is done."""
         for row in rows:

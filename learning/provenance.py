@@ -29,7 +29,7 @@ def manifest_of(
         n_epochs=protocol.epochs,
         n_trials=protocol.trials,
         changes=changes,
-        goals=tuple(GoalInfo(name=g.name, kind=g.kind.value, colour=_colour(g, scenario)) for g in scenario.goals),
+        goals=tuple(_info(g, scenario) for g in scenario.goals),
         optima=tuple(_optima(oracle, epoch, len(scenario.goals)) for epoch in (0, *changes)),
         config_sha256=hashlib.sha256(dump_resolved(resolved).encode()).hexdigest(),
         plant=f"{identity.kind.value}/{identity.model}/{identity.serial}",
@@ -47,6 +47,11 @@ def changes_of(scenario: Scenario) -> tuple[int, ...]:
 
 def _optima(oracle: Oracle, epoch: int, n_goals: int) -> tuple[int | None, ...]:
     return optimal_trials(lambda goal, state: oracle(goal, state, epoch), n_goals)
+
+
+def _info(goal: Goal, scenario: Scenario) -> GoalInfo:
+    colour = _colour(goal, scenario)
+    return GoalInfo(name=goal.name, kind=goal.kind.value, colour=colour, from_epoch=goal.from_epoch)
 
 
 def _colour(goal: Goal, scenario: Scenario) -> tuple[float, float, float]:

@@ -226,6 +226,7 @@ def _live_through(agent: Agent, station: ReplayedStation, n_done: int, tell: Cal
                 _compare(agent, station, mark, done)
                 continue
             _expect(mark, done)
+            agent.meet_goals(mark.epoch)
             goal = agent.choose_goal()
             agent.learn_epoch(station, epoch=mark.epoch, seed=mark.seed, goal=goal)
             done.n_done += 1

@@ -173,6 +173,7 @@ def load_run(folder: RunFolder) -> Run:
         evaluation_rows,
         folder.graphs(),
         n_goals=len(manifest.goals),
+        from_epochs=[goal.from_epoch for goal in manifest.goals],
         n_trials=manifest.n_trials,
         changes=manifest.changes,
         optima=manifest.optima,

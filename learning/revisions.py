@@ -31,6 +31,11 @@ class Revisions:
         self._newest = [_Revision(belief.most_probable, None) for belief in beliefs]
         self._held = list(self._newest)
 
+    def grow(self, beliefs: Sequence[Belief]) -> None:
+        """Take in new goals; what was believed of the others is believed still."""
+        new = [_Revision(belief.most_probable, None) for belief in beliefs[len(self._newest) :]]
+        self._newest, self._held = [*self._newest, *new], [*self._held, *new]
+
     def note(self, goal: int, belief: Belief, epoch: int) -> bool:
         """Take in what is believed after an update, and return whether the most probable needs are others now."""
         needs, held = belief.most_probable, self._held[goal]

@@ -49,6 +49,8 @@ class GoalInfo(msgspec.Struct, frozen=True, kw_only=True):
     kind: str
     colour: tuple[Share, Share, Share]
     """Of the goal's object."""
+    from_epoch: int = 0
+    """Epoch from which the learner knows of it."""
 
 
 class Manifest(msgspec.Struct, frozen=True, kw_only=True):
@@ -74,6 +76,11 @@ class Manifest(msgspec.Struct, frozen=True, kw_only=True):
     git: str | None
     versions: dict[str, str]
     machine: dict[str, str | int]
+
+    @property
+    def arrivals(self) -> tuple[int, ...]:
+        """Epochs at which goals become known, after the first."""
+        return tuple(sorted({goal.from_epoch for goal in self.goals} - {0}))
 
 
 class RunFolder:

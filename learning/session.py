@@ -115,7 +115,12 @@ class Session:
         )
         with pool, Tables(self._folder.path, n_rows=None if state is None else state["n_rows"]) as tables:
             experiment = Experiment(
-                plan=Plan(seed=manifest.seed, protocol=self._resolved.learning.experiment, changes=manifest.changes),
+                plan=Plan(
+                    seed=manifest.seed,
+                    protocol=self._resolved.learning.experiment,
+                    changes=manifest.changes,
+                    arrivals=manifest.arrivals,
+                ),
                 agent=learner.agent,
                 station=learning_station,
                 pool=pool,

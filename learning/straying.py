@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from learning.interfaces import Experts, GoalState, Late, TrialOutcome
+from learning.interfaces import Experts, GoalState, Grows, Late, TrialOutcome
 from learning.seeds import named_generator
 from robot.messages import Heading, Percept, StationSpec, StepResult
 
@@ -81,6 +81,11 @@ class StrayingExperts:
     def skill(self, subgoal: int) -> float:
         """Return what the experts measured."""
         return self._experts.skill(subgoal)
+
+    def grow(self, n_goals: int) -> None:
+        """Let the experts take in new goals."""
+        assert isinstance(self._experts, Grows), "an expert set does"
+        self._experts.grow(n_goals)
 
     def state_dict(self) -> dict[str, Any]:
         """Return the experts' state; there is no other."""

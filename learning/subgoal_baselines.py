@@ -42,6 +42,9 @@ class DirectSelector:
     def update(self, attempt: Attempt) -> None:
         """Learn nothing."""
 
+    def grow(self, n_goals: int) -> None:
+        """Learn nothing of new goals either."""
+
     def changed_goals(self) -> tuple[int, ...]:
         """Return nothing: nothing is believed."""
         return ()
@@ -67,6 +70,16 @@ class _Recording(QHindsightSelector):
         if attempt.outcome is not TrialOutcome.VOID:
             self._results[attempt.subgoal].append(float(attempt.outcome is TrialOutcome.ACHIEVED))
 
+    def grow(self, n_goals: int) -> None:
+        """Take in new goals, of which there are no results."""
+        super().grow(n_goals)
+        self._resize_results(n_goals)
+
+    def _resize_results(self, n_goals: int) -> None:
+        more = range(n_goals - len(self._results))
+        new = (deque[float](maxlen=2 * self._config.competence_window) for _ in more)
+        self._results = [*self._results[:n_goals], *new]
+
     def state_dict(self) -> dict[str, Any]:
         """Return everything learnt, the newest results and the generator's state."""
         return super().state_dict() | {"results": [list(kept) for kept in self._results]}
@@ -74,6 +87,7 @@ class _Recording(QHindsightSelector):
     def load_state_dict(self, state: dict[str, Any]) -> None:
         """Restore bit for bit."""
         super().load_state_dict(state)
+        self._resize_results(len(state["results"]))
         for kept, loaded in zip(self._results, state["results"], strict=True):
             kept.clear()
             kept.extend(loaded)
@@ -141,6 +155,12 @@ class MdpSelector(_Recording):
         row = self._worth.setdefault(before, np.zeros(self._n))
         target = improvement + self._config.gamma * ahead
         row[attempt.subgoal] += self._config.alpha * (target - row[attempt.subgoal])
+
+    def grow(self, n_goals: int) -> None:
+        """Take in new goals, which promise nothing yet."""
+        more = n_goals - self._n
+        super().grow(n_goals)
+        self._worth = {state: np.pad(row, (0, more)) for state, row in self._worth.items()}
 
     def state_dict(self) -> dict[str, Any]:
         """Return everything learnt and the generator's state."""

@@ -98,6 +98,11 @@ class GraphSelector:
             counted = 1.0 if self.graph.beliefs[attempt.subgoal].was_achieved else NOVICE
             self._failures[at] = self._failures.get(at, 0.0) + counted
 
+    def grow(self, n_goals: int) -> None:
+        """Take in new goals, and be curious about what they may have to do with the others."""
+        self.graph.grow(n_goals)
+        self._curiosity.wake()
+
     def changed_goals(self) -> tuple[int, ...]:
         """Return the goals for which what they need, directly or not, was revised by the last update."""
         return self._changed

@@ -68,6 +68,14 @@ class QSelector:
         """Return nothing: a table of Q-values does not say what changed."""
         return ()
 
+    def grow(self, n_goals: int) -> None:
+        """Take in new goals: of what leads to them, and of what they lead to, nothing is known."""
+        more = n_goals - self._n
+        self._q = {s: np.pad(row, ((0, more), (0, more))) for s, row in self._q.items()}
+        for goal in range(self._n, n_goals):
+            self._order = np.insert(self._order, int(self._rng.integers(len(self._order) + 1)), goal)
+        self._n = n_goals
+
     def _take_in(self, attempt: Attempt) -> _Transition | None:
         """Return the trial's transition, or None where it teaches nothing.
 
@@ -113,6 +121,7 @@ class QSelector:
 
     def load_state_dict(self, state: dict[str, Any]) -> None:
         """Restore bit for bit."""
+        self._n = len(state["order"])
         self._q = {int(s): np.array(row) for s, row in zip(state["states"], state["q"], strict=True)}
         self._known = {(int(s), int(a)) for s, a in state["known"]}
         self._order = np.array(state["order"], dtype=np.int64)

@@ -7,14 +7,23 @@ from rich.table import Table
 from rich.text import Text
 
 from learning.explain import Explanation
-from learning.metrics import EraSummary
+from learning.metrics import AddedGoal, EraSummary
 from learning.progress import duration_text
 from learning.report import Count, Report, Run, Spread
 from learning.rows import EvaluationRow
+from learning.run_folder import GoalInfo
 from learning.statistics import Interval
 from learning.time_spent import TimeSpent
 
-__all__ = ["explanation_table", "profile_table", "report_table", "report_tables", "score_table", "summary_lines"]
+__all__ = [
+    "explanation_table",
+    "not_known_yet",
+    "profile_table",
+    "report_table",
+    "report_tables",
+    "score_table",
+    "summary_lines",
+]
 
 
 def summary_lines(run: Run) -> Iterator[str]:
@@ -26,8 +35,18 @@ def summary_lines(run: Run) -> Iterator[str]:
     )
     for i, era in enumerate(summary.eras):
         yield f"  {_era_line(era, is_first=i == 0)}"
+    for added in summary.added:
+        yield f"  {_added_line(added, run.manifest.goals[added.goal].name)}"
     if run.stops is not None:
         yield f"  {run.stops.line()}"
+
+
+def _added_line(added: AddedGoal, name: str) -> str:
+    after = "not mastered yet" if added.mastered_after is None else f"mastered after {added.mastered_after} epochs"
+    others = (
+        "" if added.others_least_success is None else f", others at least {added.others_least_success:.0%} meanwhile"
+    )
+    return f"{name}, known from epoch {added.from_epoch}: {after}{others}"
 
 
 def _era_line(era: EraSummary, *, is_first: bool) -> str:
@@ -107,6 +126,12 @@ def score_table(rows: Sequence[EvaluationRow], goals: Sequence[str]) -> Table:
         graph = "–" if row.graph_cases is None else f"{row.graph_wrong} of {row.graph_cases} states"
         table.add_row(Text(goals[row.goal]), f"{row.n_successes} of {row.n_all}", trials, graph)
     return table
+
+
+def not_known_yet(explanations: Sequence[Explanation], goals: Sequence[GoalInfo]) -> list[str]:
+    """Return in words which goals the learner knows nothing of yet."""
+    told = {explanation.goal for explanation in explanations}
+    return [f"{g.name}: not known yet, from epoch {g.from_epoch}" for i, g in enumerate(goals) if i not in told]
 
 
 def explanation_table(explanations: Sequence[Explanation], goals: Sequence[str]) -> Table:

@@ -17,7 +17,8 @@ def rules_oracle(resolved: Resolved) -> Callable[[int, GoalState, int], bool]:
 
     A button can always be pressed. An object can be grabbed while the lid of the box it starts in is open. It can be
     put into a box while that box's lid is open and the object has been grabbed in this epoch. A goal-state says which
-    goals were achieved in the epoch; a latched input that no goal is about is taken to be as it was at the reset.
+    goals were achieved in the epoch, of the first few where it is shorter; a latched input that none of those is about
+    is taken to be as it was at the reset.
     """
     scenario = resolved.scenario
     judges = [_Judge(scenario, rules) for rules in resolved.rule_sets]
@@ -52,7 +53,8 @@ class _Judge:
 
     def _was_grabbed(self, name: str, state: GoalState) -> bool:
         """Whether an object was in the hand in this epoch; where no goal tells, whether it could have been."""
-        grabs = [i for i, goal in enumerate(self._goals) if goal.kind is GoalKind.GRABBED and goal.object == name]
+        told = self._goals[: len(state)]
+        grabs = [i for i, goal in enumerate(told) if goal.kind is GoalKind.GRABBED and goal.object == name]
         return any(state[i] for i in grabs) if grabs else self._is_open(self._starts_in[name], state)
 
     def _is_open(self, box: str | None, state: GoalState) -> bool:
@@ -66,7 +68,7 @@ class _Judge:
         name = literal.input
         if name in self._filled:
             return True
-        return any(is_on and _latches(goal, name) for goal, is_on in zip(self._goals, state, strict=True))
+        return any(is_on and _latches(goal, name) for goal, is_on in zip(self._goals, state, strict=False))
 
 
 def _latches(goal: Goal, name: str) -> bool:

@@ -19,18 +19,19 @@ ROOT = Path(__file__).parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
 ROOMS = ("config", "learning", "perception", "robot", "sim_twin")
 EDGES = {
-    "abstract.baselines", "abstract.bench", "abstract.learner", "abstract.oracle", "abstract.oracle_belief",
-    "abstract.oracle_value", "abstract.outside", "abstract.outside_bench", "abstract.protocol", "abstract.rules",
-    "abstract.table", "agent", "assembly", "assess", "bench", "checkpoint", "cli", "consent", "curves",
-    "demonstrations", "ended", "environments.agents", "environments.cli", "environments.course",
-    "environments.registration", "environments.rows", "environments.scene", "errors", "evaluation", "evaluation_pool",
-    "experiment", "explain", "figure_style", "figures", "figures_compared", "fingerprint", "goals", "metrics",
-    "offline", "page", "page_style", "palette", "preceding", "progress", "provenance", "recorded", "recording",
-    "replaying", "report", "report_files", "robot_hours", "robustness.cases", "robustness.cell", "robustness.cli",
-    "robustness.figure", "robustness.fork", "robustness.result", "robustness.telling", "rows", "run_folder",
-    "run_search", "seeds", "session", "session_bench", "statistics", "stops", "stopwatch", "straying", "sweeping.cells",
-    "sweeping.choosing", "sweeping.cli", "sweeping.executor", "sweeping.local", "sweeping.manifest", "sweeping.on_ray",
-    "sweeping.retrying", "sweeping.runner", "sweeping.table", "tables", "telling", "time_spent", "wanted", "wired",
+    "abstract.added", "abstract.baselines", "abstract.bench", "abstract.learner", "abstract.oracle",
+    "abstract.oracle_belief", "abstract.oracle_value", "abstract.outside", "abstract.outside_bench",
+    "abstract.protocol", "abstract.rules", "abstract.table", "agent", "assembly", "assess", "bench", "checkpoint",
+    "cli", "consent", "curves", "demonstrations", "ended", "environments.agents", "environments.cli",
+    "environments.course", "environments.registration", "environments.rows", "environments.scene", "errors",
+    "evaluation", "evaluation_pool", "experiment", "explain", "figure_style", "figures", "figures_compared",
+    "fingerprint", "goals", "metrics", "offline", "page", "page_style", "palette", "preceding", "progress",
+    "provenance", "recorded", "recording", "replaying", "report", "report_files", "robot_hours", "robustness.cases",
+    "robustness.cell", "robustness.cli", "robustness.figure", "robustness.fork", "robustness.result",
+    "robustness.telling", "rows", "run_folder", "run_search", "seeds", "session", "session_bench", "statistics",
+    "stops", "stopwatch", "straying", "sweeping.cells", "sweeping.choosing", "sweeping.cli", "sweeping.executor",
+    "sweeping.local", "sweeping.manifest", "sweeping.on_ray", "sweeping.retrying", "sweeping.runner", "sweeping.table",
+    "tables", "telling", "time_spent", "wanted", "wired",
 }  # fmt: skip
 """Modules of learning that hold nothing learnt: what runs the learner, judges it, keeps it or tells of it."""
 OWN_KEYS = {"config.learning", "config.values"}

@@ -11,10 +11,11 @@ from rich.progress import track
 
 from config.learning import LearningConfig
 from config.loader import load_learning
+from learning.abstract.added import Added, run_added
 from learning.abstract.learner import AbstractLearner, MakeAbstract, as_config_says, as_oracle
 from learning.abstract.oracle import Told
 from learning.abstract.protocol import Era, run_abstract
-from learning.abstract.rules import Rules, draw_rules
+from learning.abstract.rules import Rules, draw_more_rules, draw_rules
 from learning.abstract.table import AbstractTable, Skills
 from robot.bench import BenchReport, BenchResult, bench_report
 
@@ -30,6 +31,7 @@ ERA_EPOCHS = 300
 LEARN_GOAL, RECOVER_GOAL, RIGHT_GOAL = 150, 100, 60
 ENOUGH_SHARE, ENOUGH_MANY = 19 / 20, 18 / 20
 N_EPOCHS, EPOCHS_GOAL_S = 2000, 5.0
+ADDED_AT, ADDED_FOR, OLD_GOALS_LEAST = 150, 150, 0.9
 STEADY_EPOCHS, SETTLED_EPOCHS, STEADY_SKILL = 1000, 200, 0.9
 DECISION_GOALS, DECISION_EPOCHS, DECISION_GOAL_MS = (6, 12, 24), 40, 5.0
 
@@ -42,6 +44,7 @@ def bench_abstract(*, full: bool) -> BenchReport:
     results = (
         *_beside_the_oracle(_switch_rows, config, seeds, n_goals=N_GOALS),
         *_beside_the_oracle(_many_goals_rows, config, seeds, n_goals=N_MANY_GOALS),
+        *_added_rows(as_config_says(config), seeds),
         _steady_row(config),
         _speed_row(config),
         *(_decision_row(config, n_goals) for n_goals in DECISION_GOALS),
@@ -97,6 +100,24 @@ def _many_goals_rows(learner: MakeAbstract, seeds: Sequence[int]) -> tuple[Bench
         _share("twelve_goals_mastered_share", [_is_within(era.mastered, ERA_EPOCHS) for era in eras], ENOUGH_MANY),
         _middle("twelve_goals_mastered_after", [era.mastered for era in eras]),
     )
+
+
+def _added_rows(learner: MakeAbstract, seeds: Sequence[int]) -> tuple[BenchResult, ...]:
+    """Tell what becomes of a goal that is added when six were learnt, and of those six."""
+    runs: list[Added] = []
+    for seed in _shown(seeds, "a seventh goal"):
+        rng = np.random.default_rng([seed, N_GOALS])
+        known = draw_rules(rng, N_GOALS, max_literals=N_LITERALS)
+        rules = draw_more_rules(rng, known, N_GOALS + 1, max_literals=N_LITERALS)
+        runs.append(run_added(seed=seed, learner=learner, rules=rules, n_known=N_GOALS, at=ADDED_AT, epochs=ADDED_FOR))
+    old = min(run.old_least_success for run in runs)
+    return (
+        _middle("added_goal_mastered_after", [run.mastered_after for run in runs]),
+        BenchResult(
+            name="added_goal_old_goals_least", value=old, unit="share", goal=f">= {OLD_GOALS_LEAST:g}",
+            ok=old >= OLD_GOALS_LEAST, details={"of": "test epochs of one old goal at one evaluation since"},
+        ),
+    )  # fmt: skip
 
 
 def _steady_row(config: LearningConfig) -> BenchResult:

@@ -13,7 +13,7 @@ from learning.abstract.table import AbstractTable
 from learning.agent import GoalSelector as ChoosesGoals
 from learning.goal_selector import GoalSelector
 from learning.graph import Graph
-from learning.interfaces import Attempt, SubgoalSelector, TrialOutcome
+from learning.interfaces import Attempt, Grows, SubgoalSelector, TrialOutcome
 from learning.subgoal_graph import GraphSelector
 from learning.subgoal_selector import make_subgoal_selector
 
@@ -31,6 +31,22 @@ class AbstractLearner:
         self.goal_selector = goal_selector
         self.selector = selector
         self._outcomes: list[list[bool]] = [[] for _ in range(n_goals)]
+
+    def grow(self, n_goals: int) -> None:
+        """Take in goals that become known; the table has had them all the time.
+
+        Raises:
+            TypeError: an upper layer takes in none.
+        """
+        for layer in (self.goal_selector, self.selector):
+            if not isinstance(layer, Grows):
+                raise TypeError(f"expected layers that take in new goals, {type(layer).__name__} does not")
+            layer.grow(n_goals)
+        self._resize(n_goals)
+
+    def _resize(self, n_goals: int) -> None:
+        self.n_goals = n_goals
+        self._outcomes = [*self._outcomes[:n_goals], *([] for _ in range(n_goals - len(self._outcomes)))]
 
     def learn_epoch(self, table: AbstractTable, epoch: int) -> tuple[int, bool, int]:
         """Run one epoch of learning; return its goal, whether it was achieved, and the trials it took."""
@@ -62,6 +78,7 @@ class AbstractLearner:
         """Restore bit for bit."""
         self.goal_selector.load_state_dict(state["goal_selector"])
         self.selector.load_state_dict(state["selector"])
+        self._resize(len(state["outcomes"]))
         self._outcomes = [list(results) for results in state["outcomes"]]
 
     def _pursue(self, table: AbstractTable, epoch: int, goal: int, *, explore: bool) -> tuple[bool, int]:
@@ -75,7 +92,8 @@ class AbstractLearner:
         return table.latched[goal], n_trials
 
     def _trial(self, table: AbstractTable, epoch: int, goal: int, *, explore: bool) -> Attempt:
-        state, holds = table.latched, table.holds
+        n = self.n_goals
+        state, holds = table.latched[:n], table.holds[:n]
         subgoal = self.selector.select(
             goal=goal, state=state, available=tuple(not h for h in holds),
             temperature=self.goal_selector.temperature(goal), explore=explore,
@@ -83,8 +101,8 @@ class AbstractLearner:
         skill = self._skill(subgoal)
         outcome = table.attempt(subgoal, practise=explore)
         return Attempt(
-            epoch=epoch, goal=goal, subgoal=subgoal, state=state, state_after=table.latched, holds=holds,
-            holds_after=table.holds, outcome=outcome, predicted=skill, skill=skill, n_steps=1,
+            epoch=epoch, goal=goal, subgoal=subgoal, state=state, state_after=table.latched[:n], holds=holds,
+            holds_after=table.holds[:n], outcome=outcome, predicted=skill, skill=skill, n_steps=1,
         )  # fmt: skip
 
     def _learn(self, attempt: Attempt) -> None:

@@ -14,7 +14,17 @@ from learning.abstract.table import AbstractTable, Skills, Things
 from learning.interfaces import SubgoalSelector
 from learning.subgoal_graph import GraphSelector
 
-__all__ = ["Era", "Evaluations", "Result", "foretelling", "is_graph_right", "run_abstract"]
+__all__ = [
+    "DENSE_EVERY",
+    "N_ENOUGH",
+    "N_TESTS",
+    "Era",
+    "Evaluations",
+    "Result",
+    "foretelling",
+    "is_graph_right",
+    "run_abstract",
+]
 
 DENSE_EVERY, DENSE_FOR, EVERY = 10, 150, 50
 """How judged runs evaluate."""

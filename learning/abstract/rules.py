@@ -17,6 +17,7 @@ __all__ = [
     "Rules",
     "bits",
     "chance_of_needs",
+    "draw_more_rules",
     "draw_rules",
     "needs",
     "optimal_trials",
@@ -83,6 +84,16 @@ def draw_rules(rng: np.random.Generator, n_goals: int, *, max_literals: int = 3)
         plans = [cheapest_plan(g, START, rules.__getitem__, _effort(n_goals)) for g in range(n_goals)]
         if all(plan and len(plan) <= TRIALS - ROOM for plan in plans):
             return rules
+
+
+def draw_more_rules(rng: np.random.Generator, rules: Rules, n_goals: int, *, max_literals: int = 3) -> Rules:
+    """Draw needs of further goals, on any others, such that all can be achieved; these need none of them."""
+    while True:
+        more = tuple(_draw_needs(rng, g, n_goals, max_literals) for g in range(len(rules), n_goals))
+        whole = (*rules, *more)
+        plans = [cheapest_plan(g, START, whole.__getitem__, _effort(n_goals)) for g in range(n_goals)]
+        if all(plan and len(plan) <= TRIALS - ROOM for plan in plans):
+            return whole
 
 
 def _effort(n_goals: int) -> Effort:

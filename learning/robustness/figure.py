@@ -1,11 +1,11 @@
 """What a run bears, drawn: a panel a goal, a row a case, with intervals."""
 
 from collections.abc import Sequence
+from textwrap import fill
 
 from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import PercentFormatter
 
 from learning.figure_style import GREY, PAGE_IN, STYLE, Style, learner_styles
 from learning.report import Count
@@ -14,6 +14,8 @@ from learning.robustness.result import Robustness
 __all__ = ["robustness_figure"]
 
 ABREAST = 6
+TITLE = 14
+"""Letters in a line over a panel."""
 """Panels in a row."""
 ROW_IN, FRAME_IN = 0.19, 0.75
 APART = 0.17
@@ -35,7 +37,7 @@ def robustness_figure(told: Robustness) -> Figure:
         before, after = learner_styles(names)
         for goal, info in enumerate(told.goals):
             axes = panels[goal // ABREAST, goal % ABREAST]
-            axes.set_title(info.name.replace("_", " "), loc="left")
+            axes.set_title(fill(info.name.replace("_", " "), TITLE), loc="left")
             axes.axvline(told.cases[0].before[goal].n / max(1, told.cases[0].before[goal].of), color=GREY,
                          linewidth=0.6, linestyle=(0, (1, 2)))  # fmt: skip
             _draw(axes, [case.before[goal] for case in told.cases], before, -APART)
@@ -45,7 +47,7 @@ def robustness_figure(told: Robustness) -> Figure:
             spare.set_visible(False)
         _dress(panels[0, 0], [case.says for case in told.cases])
         for axes in panels[-1]:
-            axes.set_xlabel("achieved")
+            axes.set_xlabel("% achieved")
         handles, labels = panels[0, 0].get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside lower center", ncols=2, frameon=False)
     return figure
@@ -55,8 +57,7 @@ def _dress(axes: Axes, says: Sequence[str]) -> None:
     axes.set_yticks(range(len(says)), says)
     axes.set_ylim(len(says) - 0.5, -0.5)
     axes.set_xlim(-0.04, 1.04)
-    axes.set_xticks([0.0, 0.5, 1.0])
-    axes.xaxis.set_major_formatter(PercentFormatter(1.0))
+    axes.set_xticks([0.0, 0.5, 1.0], ["0", "50", "100"])
 
 
 def _draw(axes: Axes, counts: Sequence[Count], style: Style, off: float) -> None:

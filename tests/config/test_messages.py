@@ -115,6 +115,8 @@ SCENARIOS = [
     case("goal's box not opened over", "scenario", ["goals", 5, "box"], "red_box", "goals[5].box", "square_box, the receptacle", "red_box"),
     case("box for a button", "scenario", ["goals", 0, "box"], "red_box", "goals[0].box", "no box for kind pressed", "red_box"),
     case("workspace inside out", "scenario", ["workspace_m", 0, 1], 0.4, "workspace_m[1][1]", "the lesser value first", "0.4 and 0.36"),
+    case("no goal at first", "scenario", ["goals", 0, "from_epoch"], 3, "goals[0].from_epoch", "0: a goal that is known from the first", "3"),
+    case("a goal before the one before", "scenario", ["goals", 4, "from_epoch"], 50, "goals[5].from_epoch", "at least 50", "0"),
     case("schedule's start", "scenario", ["schedule", 0, "from_epoch"], 5, "schedule[0].from_epoch", "0, the first epoch", "5"),
     case("schedule's order", "scenario", ["schedule", 1, "from_epoch"], 0, "schedule[1].from_epoch", "an epoch after 0", "0"),
     case("schedule's rules", "scenario", ["schedule", 1, "rules"], "paper_afte", "schedule[1].rules", "paper_after", "did you mean paper_after?"),

@@ -6,6 +6,7 @@ import pytest
 from learning.errors import RunFolderError
 from learning.interfaces import TrialOutcome
 from learning.metrics import (
+    AddedGoal,
     Era,
     due_evaluations,
     due_graph_looks,
@@ -106,6 +107,28 @@ def test_eras_lie_between_changes():
 @pytest.mark.parametrize(("hits", "tests", "mastered"), [(18, 20, True), (17, 20, False), (9, 10, True), (0, 0, False)])
 def test_mastered_is_eighteen_of_twenty(hits, tests, mastered):
     assert is_mastered(row(10, hits=hits, tests=tests)) is mastered
+
+
+def test_a_goal_that_became_known_is_judged_from_then_on_and_so_are_the_others_meanwhile():
+    evaluations = [
+        row(50, 0, hits=2), row(100, 0), row(110, 0, hits=19), row(110, 1, hits=4), row(120, 0), row(120, 1),
+        row(130, 0, hits=16), row(130, 1, hits=18), row(210, 0, hits=0, rules_epoch=209), row(210, 1, hits=0),
+    ]  # fmt: skip
+    goals = [choice(epoch) for epoch in range(220)]
+    told = summarise(
+        goals, evaluations, [], n_goals=2, n_trials=8, changes=[200], optima=[(1, 1), (1, 1)], from_epochs=[0, 100]
+    )
+    assert told.added == (AddedGoal(goal=1, from_epoch=100, mastered_after=20, others_least_success=16 / 20),)
+    early = summarise(
+        goals[:90], evaluations[:1], [], n_goals=2, n_trials=8, changes=[200], optima=[(1, 1)], from_epochs=[0, 100]
+    )
+    assert early.added == ()
+
+
+def test_after_a_goal_became_known_it_is_evaluated_as_densely_as_after_a_change():
+    how = {"every": 50, "dense_every": 10, "dense_for": 20, "changes": [], "n_epochs": 200}
+    due = [n for n in range(1, 201) if due_evaluations(n, **how, arrivals=[75])]
+    assert due == [10, 20, 50, 85, 95, 100, 150, 200]
 
 
 def test_an_epoch_cut_short_counts_against_mastery():
