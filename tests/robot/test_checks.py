@@ -1,6 +1,7 @@
 """Boundary tables: the limit passes, the next float does not, per joint. And properties: what passes is inside."""
 
 import math
+import re
 
 import pytest
 from hypothesis import given
@@ -308,6 +309,13 @@ def test_motion_passes_up_to_the_age_of_a_percept_and_never_with_one_of_the_futu
     refusal = check_percept_age(None if age is None else now_ns - age, now_ns, LIMITS)
     assert (refusal is None) is passes
     assert passes or refusal.reason is Reason.STALE_PERCEPT
+
+
+def test_a_percept_that_is_too_old_is_told_with_its_age_and_what_was_expected():
+    told = check_percept_age(3 * 10**9, 4 * 10**9 + PERCEPT_AGE, LIMITS).detail
+    most_s, age_s = (float(x) for x in re.findall(r"[0-9.]+", told))
+    assert most_s == pytest.approx(PERCEPT_AGE * 1e-9, rel=1e-5)
+    assert age_s == pytest.approx(1.0 + PERCEPT_AGE * 1e-9, rel=1e-5)
 
 
 SINK, RISE = (0.0, 0.0, -0.001), (0.0, 0.0, 0.001)

@@ -3,8 +3,10 @@
 import mujoco
 import numpy as np
 import pytest
+from msgspec.structs import replace
 
 from config.loader import resolve
+from robot.chain import ToolChain
 from robot.safety.clearance import Clearance
 from robot.safety.collision_model import Hard, Near, collision_model
 from robot.safety.obstacles import blocks_of
@@ -173,3 +175,15 @@ def test_an_arm_without_parallel_axes_has_a_bound_too():
     skew = Sweep(msgspec.structs.replace(ARM, joints=tuple(rows)))
     turn = (0.01, -0.02, 0.03, 0.0, 0.01, 0.02)
     assert skew.bound_m(turn) >= Sweep(ARM).bound_m(turn)
+
+
+def test_things_that_are_put_elsewhere_are_kept_clear_of_there():
+    blocks = blocks_of(SCENARIO)
+    moved = Clearance(ARM, SCENARIO, hard=HARD, reach_m=REACH_M)
+    wrist_m = ToolChain(ARM).points(ARM.home_rad)[0][1]
+    near = (replace(blocks[0], centre_m=wrist_m), *blocks[1:])
+    before = moved.gap(ARM.home_rad)
+    moved.put(near)
+    assert moved.gap(ARM.home_rad) < 0.0 < before
+    moved.put(blocks)
+    assert moved.gap(ARM.home_rad) == before
