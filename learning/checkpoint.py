@@ -166,11 +166,16 @@ def taking_up() -> Iterator[None]:
         ) from error
 
 
+KEPT_NAME = "milestones"
+"""Folder beside the checkpoints for those that are never removed."""
+
+
 class CheckpointStore:
     """The checkpoints of one run: the last two are kept, a torn newest falls back to the one before."""
 
     def __init__(self, folder: Path, *, keep: int = 2) -> None:
         self._folder = folder
+        self._kept = folder.with_name(KEPT_NAME)
         self._keep = keep
 
     def save(self, epoch: int, raw: bytes) -> Path:
@@ -181,6 +186,23 @@ class CheckpointStore:
         for old in (*self._paths()[self._keep :], *self._folder.glob("*.tmp")):
             old.unlink(missing_ok=True)
         return path
+
+    def keep(self, epoch: int, raw: bytes) -> Path:
+        """Write the state of an epoch boundary that is worth a look later; it is never removed."""
+        self._kept.mkdir(parents=True, exist_ok=True)
+        path = self._kept / f"checkpoint-{epoch:08d}.zip"
+        write_atomically(path, raw)
+        return path
+
+    def before(self, epoch: int) -> State | None:
+        """Return the newest whole state of at most so many epochs, kept or not; None where there is none."""
+        named = {path: int(path.stem.rsplit("-", 1)[-1]) for path in (*self._paths(), *_paths(self._kept))}
+        for path in sorted((path for path, done in named.items() if done <= epoch), key=lambda path: -named[path]):
+            try:
+                return decode(path.read_bytes())
+            except (CheckpointError, OSError):
+                continue
+        return None
 
     def newest(self) -> tuple[State, list[str]]:
         """Return the newest whole state and, in words, which newer files were passed over as torn.
@@ -203,6 +225,10 @@ class CheckpointStore:
 
     def _paths(self) -> list[Path]:
         """Checkpoint files, newest first."""
-        if not self._folder.is_dir():
-            return []
-        return sorted((path for path in self._folder.iterdir() if _NAME.match(path.name)), reverse=True)
+        return _paths(self._folder)
+
+
+def _paths(folder: Path) -> list[Path]:
+    if not folder.is_dir():
+        return []
+    return sorted((path for path in folder.iterdir() if _NAME.match(path.name)), reverse=True)

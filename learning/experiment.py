@@ -133,6 +133,8 @@ class Experiment:
             self._run_epoch()
             self._look_at_graph_if_due()
             self._evaluate_if_due()
+            if self._n_done in self._plan.changes:
+                self._keep_milestone()
             is_last = self._n_done == self._plan.protocol.epochs
             if self._n_done % self._plan.protocol.checkpoint_every == 0 and not is_last:
                 self._checkpoint()
@@ -239,6 +241,11 @@ class Experiment:
         captured = _Due(epoch=self._n_done, state=encode(state), n_evaluation_rows=self._n_evaluation_rows)
         self._waiting.append(captured)
         self._keep_checkpoints()
+        self._stopwatch.lap("checkpoints")
+
+    def _keep_milestone(self) -> None:
+        """Keep what is learnt before the rules change for good, so that what followed can be looked at again."""
+        self._store.keep(self._n_done, encode({"n_done": self._n_done, "agent": self._agent.state_dict()}))
         self._stopwatch.lap("checkpoints")
 
     def _settle(self, *, at_most: int) -> None:

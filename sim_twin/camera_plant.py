@@ -20,7 +20,7 @@ from sim_twin.render import HOW_TO_DRAW, NoGLError, light_lamps
 from sim_twin.rendered_camera import Optics, RenderedCamera
 from sim_twin.studio.viewing import RIG_VIEW, View
 
-__all__ = ["CameraTwinPlant", "WatchingCamera"]
+__all__ = ["CameraTwinPlant", "WatchingCamera", "view_of"]
 
 RATE_HZ = 20.0
 OPTICS = Optics(sharpness=1.0, read_noise=1.5, shot_noise=0.02, defocus_px=0.0, latency_s=0.03)
@@ -99,7 +99,7 @@ class CameraTwinPlant:
     def __init__(self, *, arm: ArmConfig, scenario: Scenario, rig: Rig, cell: CellConfig | None = None) -> None:
         twin = TwinPlant(arm=arm, scenario=scenario, rig=rig, cell=cell)
         self._twin = twin
-        self._camera = WatchingCamera(twin.world, _view_of(rig))
+        self._camera = WatchingCamera(twin.world, view_of(rig))
         twin.world.after_tick = self._camera.watch
         self.identity: PlantIdentity = twin.identity
         self.arm: Arm = twin.arm
@@ -118,7 +118,7 @@ class CameraTwinPlant:
         return self._twin.model_sha256
 
 
-def _view_of(rig: Rig) -> View:
+def view_of(rig: Rig) -> View:
     """Return the rig's view; a camera that was moved sees everything moved the other way."""
     if rig.perturbation is None:
         return RIG_VIEW

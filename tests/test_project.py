@@ -24,14 +24,14 @@ EDGES = {
     "abstract.protocol", "abstract.rules", "abstract.table", "agent", "assembly", "assess", "bench", "checkpoint",
     "cli", "consent", "curves", "demonstrations", "ended", "environments.agents", "environments.cli",
     "environments.course", "environments.registration", "environments.rows", "environments.scene", "errors",
-    "evaluation", "evaluation_pool", "experiment", "explain", "figure_style", "figures", "figures_compared",
-    "fingerprint", "goals", "metrics", "offline", "page", "page_style", "palette", "preceding", "progress",
-    "provenance", "recorded", "recording", "replaying", "report", "report_files", "robot_hours", "robustness.cases",
-    "robustness.cell", "robustness.cli", "robustness.figure", "robustness.fork", "robustness.result",
-    "robustness.telling", "rows", "run_folder", "run_search", "seeds", "session", "session_bench", "statistics",
-    "stops", "stopwatch", "straying", "sweeping.cells", "sweeping.choosing", "sweeping.cli", "sweeping.executor",
-    "sweeping.local", "sweeping.manifest", "sweeping.on_ray", "sweeping.retrying", "sweeping.runner", "sweeping.table",
-    "tables", "telling", "time_spent", "wanted", "wired",
+    "evaluation", "evaluation_pool", "experiment", "explain", "figure_style", "figures", "figures_compared", "film.cli",
+    "film.filming", "film.lettering", "film.relive", "film.sheet", "film.story", "fingerprint", "goals", "metrics",
+    "offline", "page", "page_style", "palette", "preceding", "progress", "provenance", "recorded", "recording",
+    "replaying", "report", "report_files", "robot_hours", "robustness.cases", "robustness.cell", "robustness.cli",
+    "robustness.figure", "robustness.fork", "robustness.result", "robustness.telling", "rows", "run_folder",
+    "run_search", "seeds", "session", "session_bench", "statistics", "stops", "stopwatch", "straying", "sweeping.cells",
+    "sweeping.choosing", "sweeping.cli", "sweeping.executor", "sweeping.local", "sweeping.manifest", "sweeping.on_ray",
+    "sweeping.retrying", "sweeping.runner", "sweeping.table", "tables", "telling", "time_spent", "wanted", "wired",
 }  # fmt: skip
 """Modules of learning that hold nothing learnt: what runs the learner, judges it, keeps it or tells of it."""
 OWN_KEYS = {"config.learning", "config.values"}

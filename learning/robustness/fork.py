@@ -24,13 +24,13 @@ def learnt_state(run: RunFolder) -> dict[str, Any]:
         LearningError: the run has learnt nothing yet, or not in lock-step.
     """
     manifest, resolved = run.manifest(), run.config()
-    state, _ = run.checkpoints.newest()
-    if state["n_done"] == 0:
-        raise LearningError(f"{run.path}: expected a run that has learnt, it has done no epoch: go on with it first")
     if resolved.rig.expected.kind != "twin" or resolved.rig.bus is not None:
         raise LearningError(
             f"{run.path}: expected a run on a twin in lock-step, whose physics can be changed, it is on {manifest.rig}"
         )
+    state, _ = run.checkpoints.newest()
+    if state["n_done"] == 0:
+        raise LearningError(f"{run.path}: expected a run that has learnt, it has done no epoch: go on with it first")
     return state
 
 

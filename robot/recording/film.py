@@ -19,6 +19,7 @@ from robot.recording.images import decode_image, opencv
 from robot.recording.origin import resolved_of
 from robot.recording.session_file import SessionFile
 from robot.recording.topics import EPOCH, EVENT, GOAL, RESET_MARK, SUBGOAL
+from robot.recording.video import write_video
 from robot.rigs import load
 
 __all__ = ["DRAWER", "MOST_S", "Draws", "Moment", "moments", "save_film"]
@@ -144,24 +145,16 @@ def _chained(
 
 
 def _write(out: Path, pictures: Iterator[tuple[Picture, tuple[str, ...]]]) -> None:
+    write_video(out, (_captioned(picture, lines) for picture, lines in pictures), rate_hz=RATE_HZ)
+
+
+def _captioned(picture: Picture, lines: tuple[str, ...]) -> Picture:
     cv2 = opencv()
-    out.parent.mkdir(parents=True, exist_ok=True)
-    writer = None
-    try:
-        for picture, lines in pictures:
-            height, width = picture.shape[:2]
-            if writer is None:
-                writer = cv2.VideoWriter(str(out), cv2.VideoWriter.fourcc(*"mp4v"), RATE_HZ, (width, height))
-                if not writer.isOpened():
-                    raise UnfitError(f"{out}: expected a place and a name that ends in .mp4 to write a video to")
-            shown = np.ascontiguousarray(picture[:, :, ::-1])
-            for i, line in enumerate(lines):
-                at = (MARGIN_PX, TEXT_PX * (i + 1))
-                (wide, tall), _ = cv2.getTextSize(line, cv2.FONT_HERSHEY_SIMPLEX, 0.6, 1)
-                corner = (at[0] + wide + MARGIN_PX // 2, at[1] + MARGIN_PX // 2)
-                cv2.rectangle(shown, (at[0] - MARGIN_PX // 2, at[1] - tall - MARGIN_PX // 2), corner, PAPER, -1)
-                cv2.putText(shown, line, at, cv2.FONT_HERSHEY_SIMPLEX, 0.6, INK, 1, cv2.LINE_AA)
-            writer.write(shown)
-    finally:
-        if writer is not None:
-            writer.release()
+    shown = np.ascontiguousarray(picture)
+    for i, line in enumerate(lines):
+        at = (MARGIN_PX, TEXT_PX * (i + 1))
+        (wide, tall), _ = cv2.getTextSize(line, cv2.FONT_HERSHEY_SIMPLEX, 0.6, 1)
+        corner = (at[0] + wide + MARGIN_PX // 2, at[1] + MARGIN_PX // 2)
+        cv2.rectangle(shown, (at[0] - MARGIN_PX // 2, at[1] - tall - MARGIN_PX // 2), corner, PAPER, -1)
+        cv2.putText(shown, line, at, cv2.FONT_HERSHEY_SIMPLEX, 0.6, INK, 1, cv2.LINE_AA)
+    return shown

@@ -13,6 +13,7 @@ from config.perturbation import Perturbation
 from config.yaml_text import dump_yaml
 from robot.chain import ToolChain
 from robot.rigs import build_station
+from sim_twin.camera_plant import view_of
 from sim_twin.names import on_table
 from sim_twin.perturb import NOMINAL, PERTURBATIONS, perturbed_plant
 
@@ -155,3 +156,12 @@ def test_a_plant_that_is_no_twin_is_refused_a_perturbation(rig, tmp_path):
     file.write_text(dump_yaml(msgspec.to_builtins(replace(load_rig(rig), perturbation=NOMINAL))))
     with pytest.raises(ConfigError, match="perturbation: expected none but for a twin"):
         load_rig(file)
+
+
+def test_a_camera_that_was_moved_sees_everything_moved_the_other_way(resolved):
+    rig = replace(load_rig("twin_camera"), perturbation=Perturbation(name="other", percept_m=(0.01, -0.02, 0.0)))
+    moved, still = view_of(rig), view_of(load_rig("twin_camera"))
+    assert np.allclose(moved.T_bc[:3, :3], still.T_bc[:3, :3])
+    assert np.allclose(moved.T_bc[:3, 3] - still.T_bc[:3, 3], (-0.01, 0.02, 0.0))
+    thing, off = np.array([[0.45, 0.1, 0.03]]), np.array([0.01, -0.02, 0.0])
+    assert np.allclose(moved.seen_at(thing), still.seen_at(thing + off))

@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+from config.loader import resolve
+from config.resolved import dump_resolved
 from learning.checkpoint import encode
 from learning.errors import LearningError
 from learning.progress import Progress
@@ -18,7 +20,7 @@ from learning.robustness.cli import _plan_of
 from learning.rows import EvaluationRow
 from learning.run_folder import RunFolder
 from robot.cli import app
-from tests.support.toy_folder import make_toy_folder
+from tests.support.toy_folder import toy_manifest
 
 QUICK = "base: default\nname: quick\nexperiment: {epochs: 4, trials: 2, steps: 12, evaluate_every: 4, test_epochs: 1}\n"
 
@@ -134,20 +136,25 @@ def test_bad_usage_is_told_in_words(run, tmp_path, words, code, told):
     assert not (tmp_path / "out").exists()
 
 
-def test_a_run_on_a_plant_that_is_no_twin_is_refused(folder, tmp_path):
-    out = learn(folder, tmp_path / "fake", "--rig", "fake", "--epochs", 1)
-    done = autotelic("robustness", out)
+def test_a_run_on_a_plant_that_is_no_twin_is_refused(tmp_path):
+    with RunFolder(tmp_path / "fake") as out:
+        out.start(toy_manifest(), dump_resolved(resolve(rig="fake")))
+    done = autotelic("robustness", out.path)
     assert done.exit_code == 1
     assert "expected a run on a twin in lock-step" in done.stderr
 
 
-def test_a_run_that_has_learnt_nothing_is_refused(folder, tmp_path):
-    toy = make_toy_folder(tmp_path / "toy")
-    for path in (toy.path / "checkpoints").iterdir():
-        path.unlink()
-    done = autotelic("robustness", toy.path)
+def test_a_run_that_has_learnt_nothing_is_refused(run, tmp_path):
+    out = RunFolder(tmp_path / "new")
+    with out:
+        out.start(RunFolder(run).manifest(), (run / "config.yaml").read_text())
+    done = autotelic("robustness", out.path)
     assert done.exit_code == 1
     assert "no readable checkpoint" in done.stderr
+    out.checkpoints.save(0, encode({"n_done": 0}))
+    done = autotelic("robustness", out.path)
+    assert done.exit_code == 1
+    assert "it has done no epoch: go on with it first" in done.stderr
 
 
 def test_a_result_that_was_torn_is_told(tried, tmp_path):
