@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from config.resolved import Resolved
-from robot.messages import ArmCommand, ArmMode, ArmState, ObjectPose, Percept
+from robot.messages import ArmCommand, ArmMode, ArmState, ObjectPose, Percept, PlantKind
 from sim_twin.as_seen import AsSeen, Beginning
 from sim_twin.fitted import joint_servos
 from sim_twin.plant import TwinPlant
@@ -91,6 +91,8 @@ class TwinBeside:
         )  # fmt: skip
         self._tool = self._plant.world.model.body("tool").id
         self._jacobian = np.zeros((3, self._plant.world.model.nv))
+        self._is_of_last_step = rig.expected.kind == PlantKind.TWIN
+        """A twin tells its tool where it was at the beginning of its last step of physics; a controller does not."""
         self._things: tuple[ObjectPose, ...] = ()
         self._knows_table = False
         self._command: ArmCommand | None = None
@@ -163,6 +165,9 @@ class TwinBeside:
         self._since_s += self._tick_s
 
     def _compare(self, state: ArmState) -> None:
+        world = self._plant.world
+        if not self._is_of_last_step:
+            mujoco.mj_kinematics(world.model, world.data)
         twin = self._plant.arm.read()
         differ = state.digital_in ^ twin.digital_in if self._knows_table else None
         self.apart = apart = Apart(
