@@ -8,14 +8,14 @@ from numpy.typing import NDArray
 
 from robot.messages import ArmCommand, ArmMode, ArmState
 
-__all__ = ["Piece", "TickRow", "pieces_of", "rows_of"]
+__all__ = ["PIECE_S", "Piece", "TickRow", "pieces_of", "rows_of"]
 
 Array = NDArray[np.float64]
 PIECE_S, LEAST_S = 3.0, 0.8
 TOUCH_N = 8.0
 """A force on the tool that is so much off its middle is a touch: the twin alone does not know of it."""
 STILL_RAD = 1e-9
-N_START = 9
+START_S, LEAST_START = 0.03, 4
 STAND_S = 0.1
 LEAD_S = 0.5
 
@@ -66,8 +66,8 @@ class Piece(msgspec.Struct, frozen=True, kw_only=True, eq=False):
             still = self.q_rad[:n_stand]
             if float(np.abs(still[-1] - still[0]).max()) < 1e-3:
                 return still.mean(axis=0), np.zeros(6)
-        t = self.tick_s * np.arange(N_START)
-        curve = np.polynomial.polynomial.polyfit(t, self.q_rad[:N_START], 2)
+        n = max(LEAST_START, round(START_S / self.tick_s))
+        curve = np.polynomial.polynomial.polyfit(self.tick_s * np.arange(n), self.q_rad[:n], 2)
         return curve[0], curve[1]
 
 
@@ -91,13 +91,13 @@ def rows_of(messages: Iterable[ArmState | ArmCommand | None]) -> list[list[TickR
     return [run for run in runs if run]
 
 
-def pieces_of(rows: list[TickRow], *, tick_s: float) -> list[Piece]:
-    """Cut a run into pieces of a few seconds: no gap in it, nothing touched, nothing in the hand."""
+def pieces_of(rows: list[TickRow], *, tick_s: float, piece_s: float = PIECE_S) -> list[Piece]:
+    """Cut a run into pieces of about so many seconds: no gap in it, nothing touched, nothing in the hand."""
     pieces: list[Piece] = []
     for run in _unbroken(rows, tick_s):
         middle_n = np.median(np.array([row.state.tcp_force_n for row in run]), axis=0)
         for free in _free(run, middle_n):
-            n_pieces = max(1, round(len(free) * tick_s / PIECE_S))
+            n_pieces = max(1, round(len(free) * tick_s / piece_s))
             for part in np.array_split(np.arange(len(free)), n_pieces):
                 if len(part) * tick_s >= LEAST_S:
                     lead = free[max(0, part[0] - round(LEAD_S / tick_s)) : part[0]]

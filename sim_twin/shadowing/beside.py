@@ -97,7 +97,7 @@ class TwinBeside:
         self._knows_table = False
         self._command: ArmCommand | None = None
         self._stamp_ns, self._since_s = 0, 0.0
-        self._over_s = dict.fromkeys(("joints", "tool", "inputs"), 0.0)
+        self._over_s: dict[str, float] = dict.fromkeys(("joints", "tool", "inputs"), 0.0)
         self.apart: Apart | None = None
         self.latched: Latched | None = None
         self.n_compared = self.n_begun = 0
@@ -113,15 +113,16 @@ class TwinBeside:
         self._over_s = dict.fromkeys(self._over_s, 0.0)
 
     def see(self, percept: Percept) -> None:
-        """Take note of how the table stands; it counts at the next beginning."""
-        if all(thing.is_valid for thing in percept.objects):
-            self._things = tuple(
-                ObjectPose(name=t.name, position_m=t.position_m, quat=t.quat) for t in percept.objects
-            )  # fmt: skip
+        """Take note of how the table stands; it counts at the next beginning, which is now where it was not known."""
+        if not all(thing.is_valid for thing in percept.objects):
+            return
+        self._things = tuple(ObjectPose(name=t.name, position_m=t.position_m, quat=t.quat) for t in percept.objects)
+        if not self._knows_table:
+            self._command = None
 
     def begin_anew(self) -> None:
         """Begin where the arm is at the next tick: it or its table was placed."""
-        self._command = None
+        self._command, self._things = None, ()
 
     def take(self, state: ArmState, command: ArmCommand) -> None:
         """Take a tick: what was measured, and what was sent to the plant then."""
