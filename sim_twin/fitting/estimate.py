@@ -33,7 +33,7 @@ LASTING_S = 0.1
 Z = float(norm.ppf(0.975))
 MAX_ITER = 30
 FEW, FEW_S, ROUGHLY, CLOSELY = 1, 1.5, 0.01, 1e-4
-"""The way to the solution's neighbourhood is found on the beginning of one piece; where that way ends, and the other, in
+"""The way to the solution's neighbourhood is found on the beginning of one piece; where it ends, and the other, in
 scales of values."""
 _SCALES = np.array([v.scale for v in VALUES])
 _STEPS = np.array([v.step for v in VALUES])
@@ -58,7 +58,8 @@ class Estimate(msgspec.Struct, frozen=True, kw_only=True, eq=False):
 def joint_errors(arm: ArmAlone, x: Array, pieces: Sequence[Piece]) -> Array:
     """Return measured less simulated joints after the beginnings of pieces.  (N_VALUES,) -> (n, 6)"""
     n_burn = _burn(pieces)
-    return np.concatenate([p.q_rad[n_burn:] - arm.joints(x[None], p)[0, n_burn:] for p in pieces])
+    each = [(p.q_rad - arm.joints(x[None], p)[0]) * p.seen[:, None] for p in pieces]
+    return np.concatenate([errors[n_burn:] for errors in each])
 
 
 def estimate(arm: ArmAlone, x0: Array, pieces: Sequence[Piece]) -> Estimate:
@@ -135,7 +136,8 @@ def _by_steps(
 def _residuals(arm: ArmAlone, x: Array, pieces: Sequence[Piece], noise: Array) -> Array:
     """Return simulated less measured joints in their noise.  (k, N_VALUES) -> (k, n, 6)"""
     n_burn = _burn(pieces)
-    return np.concatenate([(arm.joints(x, p) - p.q_rad)[:, n_burn:] for p in pieces], axis=1) / noise
+    each = [(arm.joints(x, p) - p.q_rad) * p.seen[:, None] for p in pieces]
+    return np.concatenate([errors[:, n_burn:] for errors in each], axis=1) / noise
 
 
 def _jacobian(

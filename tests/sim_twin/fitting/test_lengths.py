@@ -22,6 +22,7 @@ def piece_of(x, q, *, noise_m=0.0, rng=None):
     return Piece(
         tick_s=0.01, stamp_s=0.0, asked_rad=none, lead_rad=none[:0], q_rad=q, qd_rad_s=none, tcp_m=place, tcp_quat=quat,
         force_n=none[:, :3], opening_m=0.08,
+        seen=np.ones(len(q), dtype=bool),
     )  # fmt: skip
 
 

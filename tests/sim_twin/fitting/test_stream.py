@@ -37,8 +37,13 @@ ROWS_LATER = [
 ]
 
 
-def test_a_gap_cuts():
-    assert lengths([*ROWS[:150], *ROWS[160:]]) == [150, 240]
+def test_a_gap_cuts_and_ticks_that_nobody_read_do_not():
+    assert lengths([*ROWS[:150], *ROWS[170:]]) == [150, 230]
+    (piece,) = pieces_of([*ROWS[:150], *ROWS[153:]], tick_s=TICK_S)
+    assert piece.n == 400
+    assert np.flatnonzero(~piece.seen).tolist() == [150, 151, 152]
+    assert (piece.asked_rad[150:153] == piece.asked_rad[149]).all()
+    assert piece.q_rad[153].tolist() == list(ROWS[153].state.q_rad)
 
 
 def test_a_touch_and_a_thing_in_the_hand_are_left_out():
