@@ -51,8 +51,10 @@ class BusShadow:
         self.beside = TwinBeside(resolved, bounds=bounds)
         self._caller = StopCaller(bus, by=SOURCE) if says_stop else None
         self._came: SimpleQueue[tuple[Topic[Any], Received[Any]]] = SimpleQueue()
-        watched: tuple[Topic[Any], ...] = (TICKS, PERCEPT)
-        self._subscribers = [bus.subscriber(topic, partial(self._note, topic)) for topic in watched]
+        self._subscribers = [
+            bus.subscriber(TICKS, partial(self._note, TICKS)),
+            bus.subscriber(PERCEPT, partial(self._note, PERCEPT)),
+        ]
         self._state: ArmState | None = None
         self._first_missed: int | None = None
         self.n_ticks = self.n_missed = 0
