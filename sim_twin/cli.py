@@ -10,6 +10,7 @@ from typer import Typer
 
 from config.errors import ConfigError
 from sim_twin.fitting.command import fit
+from sim_twin.shadowing.command import shadow
 
 if TYPE_CHECKING:
     from sim_twin.plant import TwinPlant
@@ -18,9 +19,10 @@ __all__ = ["app"]
 
 N_OUTPUTS = 16
 
-app = Typer(no_args_is_help=True, help="Look at the simulated table, or fit the twin to sessions of an arm.")
+app = Typer(no_args_is_help=True, help="Look at the simulated table, fit the twin to an arm, or let it follow one.")
 
 app.command()(fit)
+app.command()(shadow)
 
 ScenarioOption = Annotated[str, typer.Option("--scenario", "-s", help="A shipped scenario's name or a file.")]
 RigOption = Annotated[str, typer.Option("--rig", "-r", help="A shipped rig's name or a file.")]

@@ -31,8 +31,9 @@ def fit(
     """
     from sim_twin.fitting.fit import fit_sessions  # brings the physics and the sessions' reader
     from sim_twin.fitting.report import report_page
-    from sim_twin.fitting.written import ARM, PAGE, RIG, write_fit
+    from sim_twin.fitting.written import ARM, PAGE, RIG, check_new, write_fit
 
+    check_new(out)
     with redirected_stdout(STDERR):
         found, resolved, _, held_out = fit_sessions(sessions)
         versions = sorted(bench_report("fit", (), seconds=0.0).versions.items())

@@ -20,7 +20,7 @@ from sim_twin.fitting.values import N_VALUES, VALUES
 __all__ = ["Estimate", "estimate", "joint_errors"]
 
 Array = NDArray[np.float64]
-BURN_S = 0.2
+BURN_S = 0.3
 """After the beginning of a piece, until the arm has forgotten how it began."""
 LEAST_NOISE_RAD = 1e-5
 """What no encoder of such an arm is better than."""
@@ -32,11 +32,13 @@ LASTING_S = 0.1
 """Errors that last so long are counted as what they are."""
 Z = float(norm.ppf(0.975))
 MAX_ITER = 30
-FEW, FEW_S, ROUGHLY, CLOSELY = 2, 1.5, 0.01, 1e-4
-"""The way to the solution's neighbourhood is found on a few pieces' beginnings; where that way ends, and the other, in
+FEW, FEW_S, ROUGHLY, CLOSELY = 1, 1.5, 0.01, 1e-4
+"""The way to the solution's neighbourhood is found on the beginning of one piece; where it ends, and the other, in
 scales of values."""
 _SCALES = np.array([v.scale for v in VALUES])
 _STEPS = np.array([v.step for v in VALUES])
+_INSIDE = np.array([v.inside for v in VALUES])
+"""A smoothing that is nothing looks like a delay to whoever asks what a little more of it would do."""
 _BOUNDS = np.array([(v.low, v.high) for v in VALUES])
 
 
@@ -56,7 +58,8 @@ class Estimate(msgspec.Struct, frozen=True, kw_only=True, eq=False):
 def joint_errors(arm: ArmAlone, x: Array, pieces: Sequence[Piece]) -> Array:
     """Return measured less simulated joints after the beginnings of pieces.  (N_VALUES,) -> (n, 6)"""
     n_burn = _burn(pieces)
-    return np.concatenate([p.q_rad[n_burn:] - arm.joints(x[None], p)[0, n_burn:] for p in pieces])
+    each = [(p.q_rad - arm.joints(x[None], p)[0]) * p.seen[:, None] for p in pieces]
+    return np.concatenate([errors[n_burn:] for errors in each])
 
 
 def estimate(arm: ArmAlone, x0: Array, pieces: Sequence[Piece]) -> Estimate:
@@ -68,14 +71,21 @@ def estimate(arm: ArmAlone, x0: Array, pieces: Sequence[Piece]) -> Estimate:
         pieces: at least one, of more than its beginning.
     """
     noise = _noise(pieces)
-    told, why = _told(_jacobian(arm, x0, pieces, noise, is_quick=True), list(range(N_VALUES)))
-    x = _fitted(arm, x0, told, [p.head(FEW_S) for p in pieces[:FEW]], noise, closely=ROUGHLY)
+    x = np.maximum(x0, _INSIDE)
+    told, _ = _told(_jacobian(arm, x, pieces, noise, is_quick=True))
+    x = _fitted(arm, _with(x0, x, told), told, [p.head(FEW_S) for p in pieces[:FEW]], noise, closely=ROUGHLY)
     noise = np.maximum(LEAST_NOISE_RAD, joint_errors(arm, x, pieces).std(axis=0))
-    x = _fitted(arm, x, told, pieces, noise, closely=CLOSELY)
+    # What can be told is asked once more where the solution is: it may be told apart there.
+    told, why = _told(_jacobian(arm, np.maximum(x, _INSIDE), pieces, noise, is_quick=True))
+    x = _fitted(arm, _with(x0, x, told), told, pieces, noise, closely=CLOSELY)
     noise = np.maximum(LEAST_NOISE_RAD, joint_errors(arm, x, pieces).std(axis=0))
+    inner = [k for k in told if not _is_at_bound(x, k)]
+    if len(inner) < len(told):  # a bound is a corner, which the way to a solution gets caught in
+        x = _fitted(arm, x, inner, pieces, noise, closely=CLOSELY)
+        noise = np.maximum(LEAST_NOISE_RAD, joint_errors(arm, x, pieces).std(axis=0))
+        inner = [k for k in inner if not _is_at_bound(x, k)]
     errors = joint_errors(arm, x, pieces) / noise
     J = _jacobian(arm, x, pieces, noise)
-    inner = [k for k in told if not _is_at_bound(x, k)]
     half = np.full(N_VALUES, np.inf)
     half[inner] = Z * np.sqrt(_spread(J[:, :, inner], errors, _lasting(pieces)))
     for k in set(told) - set(inner):  # held by its bound: as far as it would be told without
@@ -126,7 +136,8 @@ def _by_steps(
 def _residuals(arm: ArmAlone, x: Array, pieces: Sequence[Piece], noise: Array) -> Array:
     """Return simulated less measured joints in their noise.  (k, N_VALUES) -> (k, n, 6)"""
     n_burn = _burn(pieces)
-    return np.concatenate([(arm.joints(x, p) - p.q_rad)[:, n_burn:] for p in pieces], axis=1) / noise
+    each = [(arm.joints(x, p) - p.q_rad) * p.seen[:, None] for p in pieces]
+    return np.concatenate([errors[:, n_burn:] for errors in each], axis=1) / noise
 
 
 def _jacobian(
@@ -146,10 +157,17 @@ def _jacobian(
     return np.moveaxis((r[:N_VALUES] - r[N_VALUES:]) / (up - down)[:, None, None], 0, -1)
 
 
-def _told(J: Array, asked: list[int]) -> tuple[list[int], list[str]]:
+def _with(x0: Array, x: Array, told: list[int]) -> Array:
+    """Return values that are told, the others as they were before."""
+    out = x0.copy()
+    out[told] = x[told]
+    return out
+
+
+def _told(J: Array) -> tuple[list[int], list[str]]:
     """Return which values pieces tell, and why the others are not told.  (n, 6, N_VALUES)"""
     why = [""] * N_VALUES
-    left = list(asked)
+    left = list(range(N_VALUES))
     scaled = J.reshape(-1, N_VALUES) * _SCALES / MISFIT
     information = scaled.T @ scaled
     while left:
@@ -185,14 +203,15 @@ def _spread(J: Array, errors: Array, n_lags: int) -> Array:
     Returns:
         (k,)
     """
-    information = np.einsum("nik,nil->kl", J, J)
-    inverse = np.linalg.pinv(information, hermitian=True)
+    size = np.maximum(np.sqrt(np.einsum("nik,nik->k", J, J)), 1e-300)
+    J = J / size  # seconds and newton metres a radian are so far apart that an inverse would lose the one to the other
+    inverse = np.linalg.pinv(np.einsum("nik,nil->kl", J, J), hermitian=True)
     scores = np.einsum("nik,ni->nk", J, errors)
     summed = scores.T @ scores
     for lag in range(1, n_lags + 1):
         both = scores[lag:].T @ scores[:-lag]
         summed += (1.0 - lag / (n_lags + 1.0)) * (both + both.T)
-    return np.maximum(np.diag(inverse), np.diag(inverse @ summed @ inverse))
+    return np.maximum(np.diag(inverse), np.diag(inverse @ summed @ inverse)) / size**2
 
 
 def _noise(pieces: Sequence[Piece]) -> Array:

@@ -20,7 +20,7 @@ from sim_twin.fitted import nominal_plant
 from sim_twin.fitting.estimate import Estimate, estimate, joint_errors
 from sim_twin.fitting.lengths import FIELDS, Lengths, fit_lengths
 from sim_twin.fitting.model import ArmAlone
-from sim_twin.fitting.stream import Piece, pieces_of, rows_of
+from sim_twin.fitting.stream import PIECE_S, Piece, TickRow, pieces_of, rows_of
 from sim_twin.fitting.values import JOINTS, VALUES, plant_of, vector_of
 
 __all__ = ["Fit", "FitRow", "HeldOut", "Source", "fit_pieces", "fit_sessions", "read_session"]
@@ -32,6 +32,8 @@ FORCE_ACCURACY_N = 4.0
 MOST_PIECES = 40
 """Two minutes: more tell little more, and take as much longer."""
 HELD_EVERY = 3
+SHORT_S = 1.3
+"""Of the pieces of a session that has few."""
 
 
 class FitRow(msgspec.Struct, frozen=True, kw_only=True):
@@ -65,7 +67,7 @@ class Source(msgspec.Struct, frozen=True, kw_only=True, eq=False):
     """What of a session is fitted to."""
 
     resolved: Resolved
-    pieces: tuple[Piece, ...]
+    runs: list[list[TickRow]]
     about: dict[str, str]
     path: str
 
@@ -121,11 +123,13 @@ def fit_sessions(paths: Sequence[Path]) -> tuple[Fit, Resolved, list[Piece], lis
             )
         if source.resolved.rig.tick_s != first.resolved.rig.tick_s:
             raise UnfitError(f"{source.path}: expected ticks as long as in {first.path}; fit each by itself")
-    pieces = [piece for source in sources for piece in source.pieces]
+    pieces = _pieces(sources, PIECE_S)
+    if len(pieces) < HELD_EVERY:
+        pieces = _pieces(sources, SHORT_S)
     if len(pieces) < 2:
         raise UnfitError(
-            f"{first.path}: expected two pieces or more of 0.8 s at least in which the arm moves freely, there are "
-            f"{len(pieces)}; record a longer session, with nothing in the hand"
+            f"{first.path}: expected two seconds or more in which the arm moves freely, there are "
+            f"{sum(p.n * p.tick_s for p in pieces):.1f}; record a longer session, with nothing in the hand"
         )
     fitted, held_out = split(pieces)
     resolved = first.resolved
@@ -194,9 +198,16 @@ def read_session(path: Path) -> Source:
     with SessionFile(path) as session:
         resolved, about = resolved_of(session), session.about
         runs = rows_of(_told(session))
-    tick_s = resolved.rig.tick_s
-    pieces = tuple(piece for run in runs for piece in pieces_of(run, tick_s=tick_s))
-    return Source(resolved=resolved, pieces=pieces, about=about, path=str(path))
+    return Source(resolved=resolved, runs=runs, about=about, path=str(path))
+
+
+def _pieces(sources: Sequence[Source], piece_s: float) -> list[Piece]:
+    return [
+        piece
+        for source in sources
+        for run in source.runs
+        for piece in pieces_of(run, tick_s=source.resolved.rig.tick_s, piece_s=piece_s)
+    ]
 
 
 def _told(session: SessionFile) -> Iterator[ArmState | ArmCommand | None]:

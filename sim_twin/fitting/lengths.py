@@ -26,7 +26,7 @@ LIKELY = 5e-3
 """How far a value may well be off, m or rad."""
 TOLD = 5e-4
 """A value is told where its interval is so much or less."""
-MOST_ROWS, N_STEPS, STEP = 600, 6, 1e-6
+MOST_ROWS, N_STEPS, STEP = 300, 6, 1e-6
 LEAST_ROWS = 30
 PARALLEL = tuple(4 * row + 1 for row in (1, 2, 3))
 """Offsets of shoulder, elbow and wrist 1 along their axes."""
@@ -58,7 +58,9 @@ def fit_lengths(arm: ArmConfig, pieces: Sequence[Piece]) -> Lengths | None:
 
     The tool itself is taken to be as the file has it.
     """
-    q, place, quat = (np.concatenate([getattr(p, name) for p in pieces]) for name in ("q_rad", "tcp_m", "tcp_quat"))
+    q, place, quat = (
+        np.concatenate([getattr(p, name)[p.seen] for p in pieces]) for name in ("q_rad", "tcp_m", "tcp_quat")
+    )
     every = max(1, len(q) // MOST_ROWS)
     q, place, quat = q[::every], place[::every], quat[::every]
     if len(q) < LEAST_ROWS or float(np.ptp(quat, axis=0).max()) < 1e-9:

@@ -13,9 +13,10 @@ from numpy.typing import NDArray
 from config.arm import ArmConfig
 from config.loader import resolve
 from config.resolved import Resolved
+from config.rig import PlantExpected
 from robot.geometry import quat_of_rotation_vector, vec6
 from robot.layout import draw_layout
-from robot.messages import ArmCommand, ArmMode, ArmState, GripCommand, GripState
+from robot.messages import ArmCommand, ArmMode, ArmState, GripCommand, GripState, PlantKind
 from robot.recording.messages import Purpose
 from robot.recording.recording import Recording
 from robot.tick_tap import TickTap
@@ -172,9 +173,10 @@ def record_trial(path: Path, by: Differing, *, seed: int, seconds: float) -> dic
 
 
 def trial_config() -> Resolved:
-    """Return what a trial's session says that it is of: the twin's rig, in slices."""
+    """Return what a trial's session says that it is of: a virtual arm, in slices, without a wire."""
     resolved = resolve()
-    rig = msgspec.structs.replace(resolved.rig, tick_s=SLICE_S, physics_s=SLICE_S)
+    expected = PlantExpected(kind=PlantKind.VIRTUAL, model=resolved.arm.name, serial="trial")
+    rig = msgspec.structs.replace(resolved.rig, expected=expected, tick_s=SLICE_S, physics_s=SLICE_S)
     return msgspec.structs.replace(resolved, rig=rig)
 
 

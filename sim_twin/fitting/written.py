@@ -13,9 +13,20 @@ from config.yaml_text import dump_yaml
 from robot.errors import RobotConfigError
 from sim_twin.fitting.fit import Fit
 
-__all__ = ["ARM", "PAGE", "RIG", "write_fit"]
+__all__ = ["ARM", "PAGE", "RIG", "check_new", "write_fit"]
 
 ARM, RIG, PAGE, NUMBERS = "arm.yaml", "rig.yaml", "report.html", "fit.json"
+
+
+def check_new(folder: Path) -> None:
+    """Refuse a folder that has a fit already, before one is made.
+
+    Raises:
+        RobotConfigError: it has.
+    """
+    there = [name for name in (ARM, RIG, PAGE, NUMBERS) if (folder / name).exists()]
+    if there:
+        raise RobotConfigError(f"{folder / there[0]}: expected a folder without a fit; give another with --out")
 
 
 def write_fit(folder: Path, fit: Fit, resolved: Resolved, page: str) -> None:

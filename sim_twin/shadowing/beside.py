@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from config.resolved import Resolved
-from robot.messages import ArmCommand, ArmMode, ArmState, ObjectPose, Percept
+from robot.messages import ArmCommand, ArmMode, ArmState, ObjectPose, Percept, PlantKind
 from sim_twin.as_seen import AsSeen, Beginning
 from sim_twin.fitted import joint_servos
 from sim_twin.plant import TwinPlant
@@ -91,11 +91,13 @@ class TwinBeside:
         )  # fmt: skip
         self._tool = self._plant.world.model.body("tool").id
         self._jacobian = np.zeros((3, self._plant.world.model.nv))
+        self._is_of_last_step = rig.expected.kind == PlantKind.TWIN
+        """A twin tells its tool where it was at the beginning of its last step of physics; a controller does not."""
         self._things: tuple[ObjectPose, ...] = ()
         self._knows_table = False
         self._command: ArmCommand | None = None
         self._stamp_ns, self._since_s = 0, 0.0
-        self._over_s = dict.fromkeys(("joints", "tool", "inputs"), 0.0)
+        self._over_s: dict[str, float] = dict.fromkeys(("joints", "tool", "inputs"), 0.0)
         self.apart: Apart | None = None
         self.latched: Latched | None = None
         self.n_compared = self.n_begun = 0
@@ -111,15 +113,16 @@ class TwinBeside:
         self._over_s = dict.fromkeys(self._over_s, 0.0)
 
     def see(self, percept: Percept) -> None:
-        """Take note of how the table stands; it counts at the next beginning."""
-        if all(thing.is_valid for thing in percept.objects):
-            self._things = tuple(
-                ObjectPose(name=t.name, position_m=t.position_m, quat=t.quat) for t in percept.objects
-            )  # fmt: skip
+        """Take note of how the table stands; it counts at the next beginning, which is now where it was not known."""
+        if not all(thing.is_valid for thing in percept.objects):
+            return
+        self._things = tuple(ObjectPose(name=t.name, position_m=t.position_m, quat=t.quat) for t in percept.objects)
+        if not self._knows_table:
+            self._command = None
 
     def begin_anew(self) -> None:
         """Begin where the arm is at the next tick: it or its table was placed."""
-        self._command = None
+        self._command, self._things = None, ()
 
     def take(self, state: ArmState, command: ArmCommand) -> None:
         """Take a tick: what was measured, and what was sent to the plant then."""
@@ -163,6 +166,9 @@ class TwinBeside:
         self._since_s += self._tick_s
 
     def _compare(self, state: ArmState) -> None:
+        world = self._plant.world
+        if not self._is_of_last_step:
+            mujoco.mj_kinematics(world.model, world.data)
         twin = self._plant.arm.read()
         differ = state.digital_in ^ twin.digital_in if self._knows_table else None
         self.apart = apart = Apart(
