@@ -92,6 +92,15 @@ class TwinWorld:
         if self._smoothing is not None:
             self._smoothing.seat(self._joint_targets)
 
+    def carry_out(self, command: ArmCommand) -> None:
+        """Let servos, hand and outputs be asked for a command from now on, which some gate has passed."""
+        self.aim(command.q_rad)
+        grip = command.grip
+        self.opening_goal_m = grip.opening_m
+        self.grip_speed_m_s = grip.speed_m_s
+        self.limit_grip(grip.force_n)
+        self.digital_out = command.digital_out
+
     def aim(self, q_rad: Vec6) -> None:
         """Let the servos be asked for joints from now on, smoothed as this arm does it.  (6,)"""
         if self._smoothing is None:
@@ -267,13 +276,7 @@ class TwinArm:
         """Set the servo targets, the hand's target and the outputs for the next tick."""
         if not self._is_connected:
             raise NotEngagedError("twin arm: expected connect() before write(); nothing moved")
-        world = self._world
-        world.aim(command.q_rad)
-        grip = command.grip
-        world.opening_goal_m = grip.opening_m
-        world.grip_speed_m_s = grip.speed_m_s
-        world.limit_grip(grip.force_n)
-        world.digital_out = command.digital_out
+        self._world.carry_out(command)
 
     def stop(self) -> bool:
         """Hold where the arm is; a hand that holds something keeps its force, other fingers stand."""

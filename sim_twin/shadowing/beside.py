@@ -134,7 +134,7 @@ class TwinBeside:
         elif self._since_s >= SETTLE_S:
             self._compare(state)
         self._stamp_ns, self._command = state.stamp_ns, command
-        self._plant.arm.write(command)
+        self._plant.world.carry_out(command)
         self._advance()
 
     def _caught_up(self, state: ArmState) -> bool:
