@@ -141,6 +141,8 @@ class RtdeArm:
             return
         _, dashboard = self._reading()
         with named("dashboard", self.address):
+            dashboard.disconnect()  # one that was made in local control obeys nobody in remote control either
+            dashboard.connect()
             is_remote = bool(dashboard.isInRemoteControl())
         check_ready(self.status(), is_remote=is_remote)
         try:

@@ -70,7 +70,7 @@ class RtdeCommand:
         self.outputs: DigitalOutputs | None = None
         self._primary = PrimaryWatch(address, tool=(*tool.tcp_m, 0.0, 0.0, 0.0))
         self._obedience, self._n_looks = Obedience(), 0
-        self._was_seen = self._has_ended = False
+        self._was_seen = self._has_ended = self._was_replaced = False
         """Our program was seen to run since it was uploaded, and to have ended: what runs after that is not ours."""
 
     def take(self, clock: Clock) -> None:
@@ -112,8 +112,15 @@ class RtdeCommand:
         with suppress(RuntimeError):  # the client throws it where it has no state
             runtime = int(self._readers()[0].getRuntimeState())
         is_foreign = changed is not None and changed[0]
-        self._links.is_lost |= is_foreign or (self._has_ended and runtime == Runtime.PLAYING)
+        self._note_replaced(is_foreign or (self._has_ended and runtime == Runtime.PLAYING))
         return self._links.is_lost
+
+    def _note_replaced(self, is_so: bool) -> None:
+        """Take note that what runs there now is not ours to end; a drive's coil that we gave current is."""
+        self._links.is_lost |= is_so
+        if is_so and not self._was_replaced:
+            self._was_replaced = True
+            self._rest_outputs()
 
     def brake(self) -> None:
         """Have our program bring the joints to rest, where it has not ended. Taken or not: rest is to be looked at."""
@@ -135,7 +142,7 @@ class RtdeCommand:
             changed = self._primary.look()
             if changed is not None:
                 is_foreign, what = changed
-                self._links.is_lost |= is_foreign  # what runs there now is not ours to end
+                self._note_replaced(is_foreign)
                 raise ArmRefusedError(f"arm: {what}")
         elif self._n_looks % LOOK_TICKS == 1:
             receive, _ = self._readers()
@@ -205,12 +212,8 @@ class RtdeCommand:
             receive, dashboard = self._readers()
             with self._in_time(STOP_S):
                 is_ended = end_program(self.control, receive, dashboard, clock)
+        is_ended = self._rest_outputs() and is_ended
         outputs, self.outputs = self.outputs, None
-        if outputs is not None:
-            is_rested = False
-            with suppress(RuntimeError):
-                is_rested = outputs.put(self._pins.rested(outputs.bits)) is None
-            is_ended = is_ended and is_rested
         if self._links.is_lost_now:
             return False
         self._links.forget()
@@ -221,6 +224,15 @@ class RtdeCommand:
             with suppress(RuntimeError):
                 control.disconnect()
         return is_ended
+
+    def _rest_outputs(self) -> bool:
+        """Leave no coil of a drive with current, and return whether that was sent: outputs have a link of their own."""
+        outputs = self.outputs
+        if outputs is None:
+            return True
+        with suppress(RuntimeError), self._in_time(STOP_S):
+            return outputs.put(self._pins.rested(outputs.bits)) is None
+        return False
 
     def end(self) -> None:
         """End the clients that a lost link has left, where this process goes on: they would go on by themselves."""
@@ -242,7 +254,7 @@ class RtdeCommand:
     def _connected(self) -> RTDEControlInterface:
         probe_upload(self._address)
         self._links.when_uploading()
-        self._was_seen = self._has_ended = False
+        self._was_seen = self._has_ended = self._was_replaced = False
         with self._in_time():
             control = RTDEControlInterface(self._address, RATE_HZ, RTDEControlInterface.FLAG_UPLOAD_SCRIPT)
         self._links.look()

@@ -1,7 +1,7 @@
 """Is this the arm of the file? Calibrated kinematics, limits and pose, compared. Pure."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -9,8 +9,9 @@ from config.arm import ArmConfig
 from config.limits import ArmPart
 from config.posture import part_points
 from robot.errors import RobotConfigError
-from robot.geometry import quat_of_rotation_vector
+from robot.geometry import quat_of_rotation_vector, vec6
 from robot.hal.ur_primary import ArmFacts
+from robot.messages import Vec6
 
 __all__ = ["check_facts", "check_pose", "check_serial", "flange_pose", "tool_off_m"]
 
@@ -19,6 +20,9 @@ CALIBRATION_M, CALIBRATION_RAD = 0.01, 0.05
 OFFSETS = (slice(0, 1), slice(1, 4), slice(4, 5), slice(5, 6))
 """Link offsets by what is compared: d of the three joints whose axes are parallel may be shifted against one another as
 far as a calibration likes, so that only their sum tells the model."""
+TOOL_M, AROUND_RAD = 0.006, 0.5
+"""How far an arm's own kinematics may bring the tool from where the file's do, which limits, fences and gate go by (a
+factory's calibration takes 1 to 2 mm, `teleop check` tries 6), and how far joints are turned from home to see it."""
 POSE_M, POSE_RAD = 1e-4, 1e-3
 LIMIT_RAD = 1e-3
 
@@ -54,12 +58,12 @@ def check_facts(facts: ArmFacts, arm: ArmConfig) -> None:
                 )
         low, high = joint.range_rad
         its_low, its_high = facts.q_min_rad[i], facts.q_max_rad[i]
-        if low < its_low - LIMIT_RAD or high > its_high + LIMIT_RAD:
+        if not (low >= its_low - LIMIT_RAD and high <= its_high + LIMIT_RAD):
             raise RobotConfigError(
                 f"joint {joint.name}: expected a range within the arm's own {its_low:.3f} .. {its_high:.3f} rad, the "
                 f"file gives {low:.3f} .. {high:.3f}: narrow it there"
             )
-        if joint.speed_rad_s > facts.qd_max_rad_s[i] + LIMIT_RAD:
+        if not joint.speed_rad_s <= facts.qd_max_rad_s[i] + LIMIT_RAD:
             raise RobotConfigError(
                 f"joint {joint.name}: expected a speed of at most the arm's own {facts.qd_max_rad_s[i]:.3f} rad/s, the "
                 f"file gives {joint.speed_rad_s:.3f}: lower it there"
@@ -72,6 +76,21 @@ def check_facts(facts: ArmFacts, arm: ArmConfig) -> None:
             raise RobotConfigError(
                 f"expected {name} of {ours:g} m as in the arm's file, the arm says {its:g}: is this another model?"
             )
+    away_m = max(tool_off_m(facts, arm, q_rad) for q_rad in _postures(facts, arm))
+    if not away_m <= TOOL_M:
+        raise RobotConfigError(
+            f"expected the arm's own kinematics to bring the tool within {1e3 * TOOL_M:g} mm of where the file's do, "
+            f"they are {1e3 * away_m:.1f} mm apart: is its calibration its own, are its joints' zeros where they were?"
+        )
+
+
+def _postures(facts: ArmFacts, arm: ArmConfig) -> Iterator[Vec6]:
+    """Yield joints at which two kinematics are compared: where the arm stands, at home, each joint turned there."""
+    yield facts.q_rad
+    yield arm.home_rad
+    for i in range(len(arm.home_rad)):
+        for turn_rad in (-AROUND_RAD, AROUND_RAD):
+            yield vec6([q + turn_rad * (i == k) for k, q in enumerate(arm.home_rad)])
 
 
 def check_pose(facts: ArmFacts) -> None:

@@ -2,6 +2,7 @@
 
 import json
 import re
+import socket
 import subprocess
 
 import pytest
@@ -10,7 +11,7 @@ import yaml
 from config.loader import resolve
 from robot.bus.virtual_table import VirtualSomebody
 from robot.cell_check import Wire
-from robot.errors import RobotConfigError
+from robot.errors import RobotConfigError, RobotError
 from robot.hal.rtde_plant import RtdePlant
 from robot.messages import ArmCommand, GripCommand
 from robot.tick_loop import TickLoop
@@ -215,3 +216,40 @@ def test_pulses_and_levels_reach_their_terminals_and_a_stop_in_a_pulse_leaves_no
         assert arm.read().digital_out == 0
     finally:
         arm.close()
+
+
+def test_a_program_that_replaces_ours_in_a_pulse_leaves_no_coil_under_current(lab):
+    """Whose program runs is one matter, whose coil is under current another: the outputs have a link of their own."""
+    folder, controller = lab
+    long_pulse = CELL.replace("pulse_s: 0.1", "pulse_s: 5.0")
+    (folder / "long_cell.yaml").write_text(long_pulse)
+    rig = yaml.safe_load((folder / "rig.yaml").read_text()) | {"cell": "./long_cell.yaml"}
+    (folder / "long.yaml").write_text(yaml.safe_dump(rig))
+    resolved = resolve(rig=folder / "long.yaml", scenario=folder / "small.yaml")
+    arm = RtdePlant(arm=resolved.arm, scenario=resolved.scenario, rig=resolved.rig, cell=resolved.cell).arm
+
+    def coil():
+        return controller.fault("truth")["digital_out"] >> 6 & 1
+
+    def write(k):
+        now_ns = arm.clock.now_ns()
+        arm.write(ArmCommand(stamp_ns=now_ns, sequence=k, q_rad=q_rad, grip=OPEN_HAND, digital_out=0b100))
+        arm.clock.wait_tick()
+        arm.read()
+
+    try:
+        arm.connect()
+        arm.engage()
+        q_rad = arm.read().q_rad
+        for k in range(10):
+            write(k)
+        assert coil() == 1
+        with socket.create_connection((HOST, 30002)) as somebody:
+            somebody.sendall(b"def other():\n while True:\n  sync()\n end\nend\n")
+            with pytest.raises(RobotError):
+                all(write(k) is None for k in range(10, 1000))
+            assert not arm.stop()
+        assert coil() == 0
+    finally:
+        arm.close()
+        controller.fault("program_stop")

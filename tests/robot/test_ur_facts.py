@@ -109,6 +109,10 @@ def test_a_calibrated_arm_is_accepted_and_its_own_numbers_are_used():
         check_pose(facts(alpha_rad=(math.pi / 2 + 1e-3, *dh("alpha_rad")[1:])))
 
 
+def test_joints_whose_zeros_are_off_by_what_a_calibration_takes_are_accepted():
+    check_facts(facts(theta_rad=(1e-3, -1e-3, 1e-3, -1e-3, 1e-3, 1e-3)), ARM)
+
+
 def test_offsets_shifted_along_parallel_axes_are_a_calibration_of_the_same_model():
     check_facts(facts(d_m=(0.1625, -12.4, 8.1, 4.3 + 0.1333, 0.0997, 0.0996)), ARM)
 
@@ -122,6 +126,11 @@ def test_offsets_shifted_along_parallel_axes_are_a_calibration_of_the_same_model
         ({"d_m": (0.1625, 0.0, 0.0, 0.1333, 0.0797, 0.1196)}, "expected d5 of"),
         ({"q_max_rad": (1.0, *(2 * math.pi,) * 5)}, "narrow it"),
         ({"qd_max_rad_s": (1.0,) * 6}, "lower it"),
+        ({"q_max_rad": (math.nan, *(2 * math.pi,) * 5)}, "narrow it"),
+        ({"qd_max_rad_s": (math.nan,) * 6}, "lower it"),
+        ({"theta_rad": (0.0, 0.049, 0.0, 0.0, 0.0, 0.0)}, "mm apart"),
+        ({"theta_rad": (math.pi / 2, 0.0, 0.0, 0.0, 0.0, 0.0)}, "mm apart"),
+        ({"theta_rad": (0.0, 0.0, math.nan, 0.0, 0.0, 0.0)}, "mm apart"),
     ],
 )
 def test_another_arm_or_narrower_limits_are_refused(changes, word):
