@@ -198,3 +198,20 @@ def test_a_wait_for_a_reset_does_not_cost_the_lease(world):
     station.reset(seed=1, epoch=0)
     assert station.state.mode is StationMode.ENGAGED
     assert isinstance(station, LocalStation)
+
+
+def test_a_source_that_was_there_all_the_while_keeps_a_lease_that_has_run_out_and_who_was_not_loses_it(world):
+    station, _, host = world
+    station.stop(by="tester")
+    host.now_ns += 3 * LIFE_NS
+    station.keep_lease()
+    with pytest.raises(SafetyError):
+        station.take_lease("another")
+    host.now_ns += 3 * LIFE_NS
+    station.take_lease("another")
+
+
+def test_where_nobody_has_a_lease_there_is_none_to_keep():
+    station = build_station(fake_rig())
+    station.keep_lease()
+    assert station.state.mode is StationMode.DISARMED
