@@ -147,16 +147,9 @@ class Agent:
         stopwatch: Stopwatch | None = None,
         arrivals: Sequence[int] = (),
     ) -> None:
-        """Put the layers together; they know the goals that are known in the first epoch.
+        """Put the layers together, made for the goals of the first epoch.
 
-        Args:
-            goal_selector: chooses goals.
-            subgoal_selector: chooses sub-goals.
-            experts: move the arm.
-            judge: tells what was achieved.
-            protocol: how long epochs and trials are.
-            stopwatch: hears of every layer's time.
-            arrivals: the epoch from which each goal is known, in order; empty: all from the first.
+        Arrivals are the epochs from which each goal is known, in order; empty: all from the first.
         """
         self._arrivals = tuple(arrivals)
         self.goal_selector = goal_selector

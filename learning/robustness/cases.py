@@ -1,7 +1,5 @@
 """What is tried on a run: a table of cases. Each changes the physics, what is perceived, or how well experts do."""
 
-from collections.abc import Iterable
-
 import msgspec
 
 from config.perturbation import Perturbation
@@ -68,7 +66,7 @@ def under_case(resolved: Resolved, case: Case, *, n_done: int, n_more: int, n_te
         n_tests: test epochs a goal, at the end.
     """
     scenario, learning = resolved.scenario, resolved.learning
-    schedule = tuple(_begun(scenario.schedule, n_done))
+    schedule = tuple(span for span in scenario.schedule if span.from_epoch < n_done)
     protocol = msgspec.structs.replace(
         learning.experiment,
         epochs=n_done + n_more, evaluate_every=n_done + n_more, dense_for=0, dense_every=LOOK_EVERY,
@@ -82,8 +80,3 @@ def under_case(resolved: Resolved, case: Case, *, n_done: int, n_more: int, n_te
         rule_sets=resolved.rule_sets[: len(schedule)],
         learning=msgspec.structs.replace(learning, experiment=protocol, expert=expert),
     )
-
-
-def _begun(schedule: Iterable, n_done: int) -> Iterable:
-    """Return the spans in force in an epoch that was done, or before."""
-    return (span for span in schedule if span.from_epoch < n_done)

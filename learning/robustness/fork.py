@@ -1,6 +1,5 @@
 """A run is taken up elsewhere: a folder of its own that goes on from another's newest checkpoint. The edge: files."""
 
-from pathlib import Path
 from typing import Any
 
 from config.resolved import Resolved, dump_resolved
@@ -61,4 +60,4 @@ def fork(folder: RunFolder, resolved: Resolved, state: dict[str, Any], *, seed: 
     folder.checkpoints.save(state["n_done"], encode(begun))
     folder.write_json(MANIFEST_NAME, manifest)
     # The config comes last: with it the folder is a run's.
-    write_atomically(Path(folder.path / CONFIG_NAME), dump_resolved(resolved).encode())
+    write_atomically(folder.path / CONFIG_NAME, dump_resolved(resolved).encode())

@@ -6,7 +6,7 @@ from rich import box
 from rich.table import Table
 from rich.text import Text
 
-from learning.report import Count
+from learning.report import Count, count
 from learning.robustness.result import Bearing, Robustness
 
 __all__ = ["robustness_table"]
@@ -31,8 +31,6 @@ def robustness_table(told: Robustness) -> Table:
 
 
 def _interval(told: Robustness) -> str:
-    from learning.report import count
-
     best = count(told.plan.n_tests, told.plan.n_tests)
     return f"{best.share_low:.0%} to {best.share_high:.0%}"
 
@@ -40,13 +38,9 @@ def _interval(told: Robustness) -> str:
 def _cells(case: Bearing) -> list[str]:
     after: Sequence[Count | None] = case.after or (None,) * len(case.before)
     return [
-        f"{then.n}{_cut(then)}" + ("" if now is None else f"\n{now.n}{_cut(now)}")
+        f"{then.n}/{then.of}" + ("" if now is None else f"\n{now.n}/{now.of}")
         for then, now in zip(case.before, after, strict=True)
     ]
-
-
-def _cut(entry: Count) -> str:
-    return f"/{entry.of}"
 
 
 def _graph(case: Bearing) -> str:

@@ -10,13 +10,14 @@ from config.loader import resolve
 from config.yaml_text import dump_yaml
 from learning.assembly import build_agent
 from learning.checkpoint import encode
+from learning.report import load_run
 from learning.run_folder import RunFolder
-from learning.session import open_session
-from learning.stopwatch import Stopwatch
+from learning.telling import summary_lines
 from learning.wanted import Wanted
 from robot.cli import app
 from robot.oracle import rules_oracle
 from tests.support.kinematic_table import KinematicTable
+from tests.support.quiet_run import learn_quietly
 from tests.support.toy_run import files_of
 
 replace = msgspec.structs.replace
@@ -37,46 +38,9 @@ def folder(tmp_path_factory):
     return path
 
 
-class Quiet:
-    """Watches, and keeps what it is told of goals."""
-
-    def __init__(self):
-        self.met, self.n_steps = [], 0
-
-    def epoch_begins(self, epoch, goal):
-        pass
-
-    def epoch_ended(self, record):
-        pass
-
-    def evaluated(self, rows):
-        pass
-
-    def say(self, line):
-        pass
-
-    def goals_met(self, epoch, goals):
-        self.met.append((epoch, tuple(goals)))
-
-
-def learn(folder, out, *, until=N_EPOCHS, watcher=None):
-    """Learn up to an epoch, or go on to it."""
-    own = RunFolder(out)
-    watcher = watcher or Quiet()
-    with own:
-        wanted = Wanted(scenario=str(folder / "later.yaml"), preset=str(folder / "quick.yaml"), seed=2)
-        session = open_session(own, wanted, resume=True, stopwatch=Stopwatch())
-        done = [session.n_done]
-
-        def should_stop():
-            done[0] += 1
-            return done[0] > until
-
-        try:
-            session.run(watcher, n_workers=0, should_stop=should_stop)
-        finally:
-            session.close()
-    return own, watcher
+def learn(folder, out, *, until=N_EPOCHS):
+    wanted = Wanted(scenario=str(folder / "later.yaml"), preset=str(folder / "quick.yaml"), seed=2)
+    return learn_quietly(out, wanted, until=until)
 
 
 @pytest.fixture(scope="module")
@@ -96,7 +60,13 @@ def test_goals_are_neither_wanted_nor_tried_nor_judged_before_they_are_known(who
     assert tested == {4: {0, 1, 2, 3}, 6: set(range(6)), 8: set(range(6))}
 
 
-@pytest.mark.parametrize("at", [3, 4, 5])
+@pytest.fixture(scope="module")
+def early(folder):
+    """A run that was stopped before the goals became known."""
+    return learn(folder, folder / "early", until=2)[0]
+
+
+@pytest.mark.parametrize("at", [pytest.param(3, marks=pytest.mark.slow), 4, pytest.param(5, marks=pytest.mark.slow)])
 def test_stopped_and_taken_up_across_the_moment_is_identical(folder, whole, tmp_path, at):
     out = tmp_path / "run"
     learn(folder, out, until=at)
@@ -105,14 +75,13 @@ def test_stopped_and_taken_up_across_the_moment_is_identical(folder, whole, tmp_
     assert files_of(out) == files_of(whole[0].path)
 
 
-def test_a_checkpoint_says_how_many_goals_are_known_only_while_not_all_are(folder, whole, tmp_path):
-    run, _ = learn(folder, tmp_path / "run", until=2)
-    assert run.checkpoints.newest()[0]["agent"]["n_goals"] == 4
+def test_a_checkpoint_says_how_many_goals_are_known_only_while_not_all_are(early, whole):
+    assert early.checkpoints.newest()[0]["agent"]["n_goals"] == 4
     assert "n_goals" not in whole[0].checkpoints.newest()[0]["agent"]
 
 
-def test_explain_and_evaluate_tell_which_goals_are_not_known_yet(folder, whole, tmp_path):
-    run, _ = learn(folder, tmp_path / "run", until=2)
+def test_explain_and_evaluate_tell_which_goals_are_not_known_yet(early, whole):
+    run = early
     told = CliRunner().invoke(app, ["explain", str(run.path)])
     assert told.exit_code == 0, told.output
     assert "blue_grabbed: not known yet, from epoch 4" in told.stdout
@@ -126,12 +95,12 @@ def test_explain_and_evaluate_tell_which_goals_are_not_known_yet(folder, whole, 
     assert len(later["explanations"]) == 6
 
 
-def test_the_report_tells_what_became_of_them(whole, tmp_path):
-    done = CliRunner().invoke(app, ["report", str(whole[0].path), "--out", str(tmp_path), "--json"])
-    assert done.exit_code == 0, done.output
-    ((_, summary),) = json.loads(done.stdout)["runs"]
-    assert [(entry["goal"], entry["from_epoch"]) for entry in summary["added"]] == [(4, 4), (5, 4)]
-    assert [goal.from_epoch for goal in whole[0].manifest().goals] == [0, 0, 0, 0, 4, 4]
+def test_the_report_tells_what_became_of_them(whole):
+    run = load_run(whole[0])
+    assert [(entry.goal, entry.from_epoch) for entry in run.summary.added] == [(4, 4), (5, 4)]
+    assert [goal.from_epoch for goal in run.manifest.goals] == [0, 0, 0, 0, 4, 4]
+    told = " ".join(summary_lines(run))
+    assert "blue_grabbed, known from epoch 4: " in told
 
 
 def test_where_all_are_known_from_the_first_epoch_nothing_is_as_it_was_not_before():

@@ -18,8 +18,10 @@ from learning.film.relive import Reliving
 from learning.film.sheet import SIZE_PX
 from learning.report import load_run
 from learning.run_folder import RunFolder
+from learning.wanted import Wanted
 from robot.cli import app
 from robot.recording.images import opencv
+from tests.support.quiet_run import learn_quietly
 from tests.support.toy_folder import toy_manifest
 
 QUICK = "base: default\nname: quick\nexperiment: {epochs: 6, trials: 3, steps: 16, evaluate_every: 3, test_epochs: 1}\n"
@@ -41,18 +43,10 @@ def folder(tmp_path_factory):
     return path
 
 
-def learn(folder, out, *words):
-    done = autotelic(
-        "learn", "--scenario", folder / "early.yaml", "--preset", folder / "quick.yaml", "--workers", 0, "--seed", 4,
-        "--out", out, *words,
-    )  # fmt: skip
-    assert done.exit_code == 0, done.output
-    return RunFolder(out)
-
-
 @pytest.fixture(scope="module")
 def run(folder):
-    return learn(folder, folder / "run")
+    wanted = Wanted(scenario=str(folder / "early.yaml"), preset=str(folder / "quick.yaml"), seed=4)
+    return learn_quietly(folder / "run", wanted)[0]
 
 
 @pytest.fixture

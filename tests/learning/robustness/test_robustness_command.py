@@ -19,7 +19,9 @@ from learning.robustness.cell import n_steps_done, read_result, run_case
 from learning.robustness.cli import _plan_of
 from learning.rows import EvaluationRow
 from learning.run_folder import RunFolder
+from learning.wanted import Wanted
 from robot.cli import app
+from tests.support.quiet_run import learn_quietly
 from tests.support.toy_folder import toy_manifest
 
 QUICK = "base: default\nname: quick\nexperiment: {epochs: 4, trials: 2, steps: 12, evaluate_every: 4, test_epochs: 1}\n"
@@ -29,9 +31,8 @@ def autotelic(*words):
     return CliRunner().invoke(app, [str(word) for word in words])
 
 
-def learn(folder, out, *words):
-    done = autotelic("learn", "--preset", folder / "quick.yaml", "--workers", 0, "--seed", 3, "--out", out, *words)
-    assert done.exit_code == 0, done.output
+def learn(folder, out, *, epochs=4):
+    learn_quietly(out, Wanted(preset=str(folder / "quick.yaml"), seed=3, epochs=epochs))
     return out
 
 
@@ -64,7 +65,7 @@ def learnt(run):
 
 
 def test_tried_as_learnt_it_is_the_run_that_went_on(folder, tried):
-    whole = RunFolder(learn(folder, folder / "longer", "--epochs", 6))
+    whole = RunFolder(learn(folder, folder / "longer", epochs=6))
     gone_on = RunFolder(tried / "nominal")
     assert gone_on.trials() == [row for row in whole.trials() if row.epoch >= 4]
     assert [row.epoch for row in gone_on.goals()] == [4, 5]

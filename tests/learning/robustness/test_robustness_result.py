@@ -71,6 +71,7 @@ def test_the_table_tells_every_case_and_every_goal(told):
     assert "1 of 144, right at 1 of 3 looks" in text
 
 
+@pytest.mark.slow
 def test_the_figure_is_drawn_in_vectors_too_and_always_the_same(told, tmp_path):
     once, again = (save(robustness_figure(told), tmp_path / name, "robustness") for name in "ab")
     assert [path.suffix for path in once] == [".png", ".pdf", ".svg"]
