@@ -14,7 +14,7 @@ from sim_twin.fitting.trial import differing, record_trial
 
 __all__ = ["bench_fit"]
 
-N_QUICK, N_FULL, FIRST_SEED = 3, 100, 7000
+N_QUICK, N_FULL, FIRST_SEED = 3, 100, 8000
 SECONDS = 4.0
 COVERED, MOST_RAD = 0.9, 3e-3
 

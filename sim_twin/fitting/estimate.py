@@ -26,19 +26,20 @@ LEAST_NOISE_RAD = 1e-5
 """What no encoder of such an arm is better than."""
 TOLD_SHARE = 0.2
 """A value is told where its interval is this share of how far off it may well be, or less."""
-MISFIT = 3.0
-"""Before anything is fitted, for what may be left beside noise."""
 LASTING_S = 0.1
 """Errors that last so long are counted as what they are."""
 Z = float(norm.ppf(0.975))
 MAX_ITER = 30
-FEW, FEW_S, ROUGHLY, CLOSELY = 1, 1.5, 0.01, 1e-4
-"""The way to the solution's neighbourhood is found on the beginning of one piece; where it ends, and the other, in
+FEW, FEW_S, ROUGHLY, CLOSELY = 2, 1.0, 0.01, 1e-4
+"""The way to the solution's neighbourhood is found on the beginnings of two pieces; where it ends, and the other, in
 scales of values."""
 _SCALES = np.array([v.scale for v in VALUES])
 _STEPS = np.array([v.step for v in VALUES])
-_INSIDE = np.array([v.inside for v in VALUES])
-"""A smoothing that is nothing looks like a delay to whoever asks what a little more of it would do."""
+_STARTS = np.array([v.inside for v in VALUES]).T
+"""(n, N_VALUES) where fits begin at least: a smoothing that is nothing looks like a delay to whoever asks what a little
+more of it would do."""
+SOLVED_TO = 1.15
+"""Times its noise that a joint is off at a solution; where more is left another start is tried."""
 _BOUNDS = np.array([(v.low, v.high) for v in VALUES])
 
 
@@ -67,64 +68,59 @@ def estimate(arm: ArmAlone, x0: Array, pieces: Sequence[Piece]) -> Estimate:
 
     Args:
         arm: makes joints of values.
-        x0: (N_VALUES,) to begin with; what is not told stays so.
+        x0: (N_VALUES,) to begin with; what is not told stays about there.
         pieces: at least one, of more than its beginning.
     """
-    noise = _noise(pieces)
-    x = np.maximum(x0, _INSIDE)
-    told, _ = _told(_jacobian(arm, x, pieces, noise, is_quick=True))
-    x = _fitted(arm, _with(x0, x, told), told, [p.head(FEW_S) for p in pieces[:FEW]], noise, closely=ROUGHLY)
+    quiet = _noise(pieces)
+    best: tuple[float, Array] | None = None
+    for start in _STARTS:
+        x = _fitted(arm, x0, np.maximum(x0, start), [p.head(FEW_S) for p in pieces[:FEW]], quiet, closely=ROUGHLY)
+        x = _fitted(arm, x0, x, pieces, quiet, closely=CLOSELY)
+        left = float((joint_errors(arm, x, pieces).std(axis=0) / quiet).max())
+        if best is None or left < best[0]:
+            best = left, x
+        if left < SOLVED_TO:
+            break
+    assert best is not None, "there are starts"
+    x = best[1]
     noise = np.maximum(LEAST_NOISE_RAD, joint_errors(arm, x, pieces).std(axis=0))
-    # What can be told is asked once more where the solution is: it may be told apart there.
-    told, why = _told(_jacobian(arm, np.maximum(x, _INSIDE), pieces, noise, is_quick=True))
-    x = _fitted(arm, _with(x0, x, told), told, pieces, noise, closely=CLOSELY)
-    noise = np.maximum(LEAST_NOISE_RAD, joint_errors(arm, x, pieces).std(axis=0))
-    inner = [k for k in told if not _is_at_bound(x, k)]
-    if len(inner) < len(told):  # a bound is a corner, which the way to a solution gets caught in
-        x = _fitted(arm, x, inner, pieces, noise, closely=CLOSELY)
-        noise = np.maximum(LEAST_NOISE_RAD, joint_errors(arm, x, pieces).std(axis=0))
-        inner = [k for k in inner if not _is_at_bound(x, k)]
-    errors = joint_errors(arm, x, pieces) / noise
     J = _jacobian(arm, x, pieces, noise)
+    why = _reasons(J)
     half = np.full(N_VALUES, np.inf)
-    half[inner] = Z * np.sqrt(_spread(J[:, :, inner], errors, _lasting(pieces)))
-    for k in set(told) - set(inner):  # held by its bound: as far as it would be told without
-        half[k] = Z * np.sqrt(_spread(J[:, :, [k]], errors, _lasting(pieces))[0])
-    for k in told:
-        if half[k] > TOLD_SHARE * _SCALES[k]:
-            why[k] = f"not closer than ± {half[k]:.2g} {VALUES[k].unit}"
-            half[k] = np.inf
-    final = tuple(bool(np.isfinite(h)) for h in half)
-    return Estimate(x=x, half=half, told=final, why=tuple(why), noise_rad=noise)
+    inner = [k for k in range(N_VALUES) if not _is_at_bound(x, k)]
+    errors = joint_errors(arm, x, pieces) / noise
+    half[inner] = Z * np.sqrt(_spread(J[:, :, inner], _SCALES[inner], errors, _lasting(pieces)))
+    for k in set(range(N_VALUES)) - set(inner):  # held by its bound: as far as it would be told without
+        half[k] = Z * np.sqrt(_spread(J[:, :, [k]], _SCALES[[k]], errors, _lasting(pieces))[0])
+    told = half <= TOLD_SHARE * _SCALES
+    for k in np.flatnonzero(told):
+        why[k] = ""
+    for k in np.flatnonzero(~told):
+        why[k] = why[k] or f"not closer than ± {half[k]:.2g} {VALUES[k].unit}"
+        half[k] = np.inf
+    return Estimate(x=x, half=half, told=tuple(told.tolist()), why=tuple(why), noise_rad=noise)
 
 
-def _fitted(
-    arm: ArmAlone, x0: Array, told: list[int], pieces: Sequence[Piece], noise: Array, *, closely: float
-) -> Array:
-    scales = _SCALES[told]
+def _fitted(arm: ArmAlone, x0: Array, begin: Array, pieces: Sequence[Piece], noise: Array, *, closely: float) -> Array:
+    """Return the values that explain pieces best, each taken to be about where the file has it, within its scale."""
 
     def residual(z: Array) -> Array:
         """(k, n) -> (m, n)"""
-        x = np.tile(x0, (z.shape[1], 1))
-        x[:, told] = (z * scales[:, None]).T
-        x = np.clip(x, _BOUNDS[:, 0], _BOUNDS[:, 1])
-        return _residuals(arm, x, pieces, noise).reshape(len(x), -1).T
+        x = np.clip((z * _SCALES[:, None]).T, _BOUNDS[:, 0], _BOUNDS[:, 1])
+        seen = _residuals(arm, x, pieces, noise).reshape(len(x), -1)
+        return np.concatenate([seen, (x - x0) / _SCALES], axis=1).T
 
-    low, high = _BOUNDS[told].T / scales
+    low, high = _BOUNDS.T / _SCALES
     found, _ = minimize.least_squares(
-        x0[told] / scales, residual, [low, high], jacobian=_by_steps(residual, told, high), max_iter=MAX_ITER,
-        xtol=closely, verbose=minimize.Verbosity.SILENT,
+        begin / _SCALES, residual, [low, high], jacobian=_by_steps(residual, high), max_iter=MAX_ITER, xtol=closely,
+        verbose=minimize.Verbosity.SILENT,
     )  # fmt: skip
-    x = x0.copy()
-    x[told] = found.ravel() * scales
-    return x
+    return found.ravel() * _SCALES
 
 
-def _by_steps(
-    residual: Callable[[Array], Array], told: list[int], high: Array
-) -> Callable[[Array, Array], Array]:  # fmt: skip
+def _by_steps(residual: Callable[[Array], Array], high: Array) -> Callable[[Array, Array], Array]:
     """Return what takes differences by each value's own step."""
-    steps = (_STEPS / _SCALES)[told]
+    steps = _STEPS / _SCALES
 
     def jacobian(z: Array, r: Array) -> Array:
         signed = np.where(z.ravel() + steps > high, -steps, steps)
@@ -140,16 +136,10 @@ def _residuals(arm: ArmAlone, x: Array, pieces: Sequence[Piece], noise: Array) -
     return np.concatenate([errors[:, n_burn:] for errors in each], axis=1) / noise
 
 
-def _jacobian(
-    arm: ArmAlone, x: Array, pieces: Sequence[Piece], noise: Array, *, is_quick: bool = False
-) -> Array:  # fmt: skip
+def _jacobian(arm: ArmAlone, x: Array, pieces: Sequence[Piece], noise: Array) -> Array:
     """Return how joints change with each value, between both sides where bounds leave room.  () -> (n, 6, N_VALUES)"""
     up = np.minimum(x + _STEPS, _BOUNDS[:, 1])
     down = np.maximum(x - _STEPS, _BOUNDS[:, 0])
-    if is_quick:
-        one = np.concatenate([np.tile(x, (N_VALUES, 1)) + np.diag(up - x), x[None]])
-        r = _residuals(arm, one, pieces, noise)
-        return np.moveaxis((r[:-1] - r[-1]) / (up - x)[:, None, None], 0, -1)
     both = np.tile(x, (2 * N_VALUES, 1))
     both[np.arange(N_VALUES), np.arange(N_VALUES)] = up
     both[N_VALUES + np.arange(N_VALUES), np.arange(N_VALUES)] = down
@@ -157,22 +147,14 @@ def _jacobian(
     return np.moveaxis((r[:N_VALUES] - r[N_VALUES:]) / (up - down)[:, None, None], 0, -1)
 
 
-def _with(x0: Array, x: Array, told: list[int]) -> Array:
-    """Return values that are told, the others as they were before."""
-    out = x0.copy()
-    out[told] = x[told]
-    return out
-
-
-def _told(J: Array) -> tuple[list[int], list[str]]:
-    """Return which values pieces tell, and why the others are not told.  (n, 6, N_VALUES)"""
+def _reasons(J: Array) -> list[str]:
+    """Return why values are not told by noise like what is left, empty for those that are.  (n, 6, N_VALUES)"""
     why = [""] * N_VALUES
     left = list(range(N_VALUES))
-    scaled = J.reshape(-1, N_VALUES) * _SCALES / MISFIT
+    scaled = J.reshape(-1, N_VALUES) * _SCALES
     information = scaled.T @ scaled
     while left:
         part = information[np.ix_(left, left)]
-        # What nobody looked for is known within its scale already.
         covariance = np.asarray(np.linalg.inv(part + np.eye(len(left))), np.float64)
         half = Z * np.sqrt(np.diag(covariance))
         worst = int(np.argmax(half))
@@ -180,7 +162,7 @@ def _told(J: Array) -> tuple[list[int], list[str]]:
             break
         why[left[worst]] = _reason(part, covariance, left, worst)
         left.pop(worst)
-    return left, why
+    return why
 
 
 def _reason(information: Array, covariance: Array, left: list[int], worst: int) -> str:
@@ -192,11 +174,12 @@ def _reason(information: Array, covariance: Array, left: list[int], worst: int) 
     return f"not told apart from {VALUES[left[int(np.argmax(alike))]].name}"
 
 
-def _spread(J: Array, errors: Array, n_lags: int) -> Array:
+def _spread(J: Array, scales: Array, errors: Array, n_lags: int) -> Array:
     """Return variances: those of independent errors, or those of errors that last, whichever is more.
 
     Args:
         J: (n, 6, k)
+        scales: (k,) within which values were known before.
         errors: (n, 6), in their noise.
         n_lags: ticks.
 
@@ -205,7 +188,8 @@ def _spread(J: Array, errors: Array, n_lags: int) -> Array:
     """
     size = np.maximum(np.sqrt(np.einsum("nik,nik->k", J, J)), 1e-300)
     J = J / size  # seconds and newton metres a radian are so far apart that an inverse would lose the one to the other
-    inverse = np.linalg.pinv(np.einsum("nik,nil->kl", J, J), hermitian=True)
+    information = np.einsum("nik,nil->kl", J, J) + np.diag(1.0 / (scales * size) ** 2)
+    inverse = np.linalg.pinv(information, hermitian=True)
     scores = np.einsum("nik,ni->nk", J, errors)
     summed = scores.T @ scores
     for lag in range(1, n_lags + 1):

@@ -29,8 +29,8 @@ Array = NDArray[np.float64]
 GRAVITY_M_S2 = 9.81
 FORCE_ACCURACY_N = 4.0
 """Of the force sensor in the flange, by the maker's data sheet."""
-MOST_PIECES = 40
-"""Two minutes: more tell little more, and take as much longer."""
+MOST_PIECES = 12
+"""Half a minute or so: more tell little more, and take as much longer."""
 HELD_EVERY = 3
 SHORT_S = 1.3
 """Of the pieces of a session that has few."""
@@ -45,7 +45,7 @@ class FitRow(msgspec.Struct, frozen=True, kw_only=True):
     """As the file has it."""
     value: float
     half: float | None
-    """Of the 95 % interval; None where the sessions do not tell the value, which is the file's then."""
+    """Of the 95 % interval; None where the sessions do not tell the value, which is about the file's then."""
     why: str = ""
     """Why they do not."""
 

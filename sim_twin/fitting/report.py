@@ -47,7 +47,8 @@ def report_page(
         "<h2>Joints, twin less arm, on what was not fitted</h2>", _errors_table(fit),
         _drawing(_errors_figure(fit, arm, held_out, physics_s)),
         "<h2>What the sessions tell</h2>", _values_table(told),
-        "<h2>What they do not tell</h2><p>These stay as the file has them.</p>", _values_table(untold, is_told=False),
+        "<h2>What they do not tell</h2><p>These are taken to be about what the file has.</p>",
+        _values_table(untold, is_told=False),
         "<h2>Payload by the force on the tool</h2>",
         f"<p>{fit.force_kg:.2f} ± {fit.force_half_kg:.2f} kg more than the controller knows of. Whoever zeroed the "
         "sensor since took it away from here; the joints' droop above does not know of that.</p>",
@@ -73,7 +74,7 @@ def _errors_table(fit: Fit) -> str:
 def _values_table(rows: Iterable[FitRow], *, is_told: bool = True) -> str:
     cells = [
         (
-            row.name, _number(row.before), _number(row.value) if is_told else "–",
+            row.name, _number(row.before), _number(row.value),
             "–" if row.half is None else f"± {_number(row.half)}", row.unit, row.why,
         )
         for row in rows

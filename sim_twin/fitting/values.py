@@ -24,8 +24,8 @@ class Value(msgspec.Struct, frozen=True, kw_only=True):
     """How far from the file's it may well be: what is not told closer than a share of this is not told at all."""
     step: float
     """Of differences."""
-    inside: float = -np.inf
-    """Where a fit begins at least."""
+    inside: tuple[float, float, float] = (-np.inf, -np.inf, -np.inf)
+    """Where fits begin at least, one start after another."""
 
     @property
     def name(self) -> str:
@@ -47,7 +47,7 @@ VALUES: tuple[Value, ...] = (
     *_each("friction", "Nm", 0.0, 150.0, (10.0, 3.0), 0.01),
     Value(kind="payload", unit="kg", low=-5.0, high=15.0, scale=2.0, step=0.01),
     Value(kind="dead time", unit="s", low=0.0, high=0.06, scale=0.01, step=1e-4),
-    Value(kind="smoothing", unit="s", low=0.0, high=0.25, scale=0.03, step=3e-4, inside=0.01),
+    Value(kind="smoothing", unit="s", low=0.0, high=0.25, scale=0.03, step=3e-4, inside=(0.01, 0.03, 0.002)),
 )
 N_VALUES = len(VALUES)
 
