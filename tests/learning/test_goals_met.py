@@ -23,7 +23,7 @@ from tests.support.toy_run import files_of
 replace = msgspec.structs.replace
 N_EPOCHS, ARRIVAL = 8, 4
 QUICK = (
-    "base: default\nname: quick\nexperiment: {epochs: 8, trials: 3, steps: 20, evaluate_every: 4, test_epochs: 1, "
+    "base: default\nname: quick\nexperiment: {epochs: 8, trials: 2, steps: 8, evaluate_every: 4, test_epochs: 1, "
     "dense_every: 2, dense_for: 2, checkpoint_every: 2}\n"
 )
 

@@ -24,7 +24,7 @@ from robot.recording.images import opencv
 from tests.support.quiet_run import learn_quietly
 from tests.support.toy_folder import toy_manifest
 
-QUICK = "base: default\nname: quick\nexperiment: {epochs: 6, trials: 3, steps: 16, evaluate_every: 3, test_epochs: 1}\n"
+QUICK = "base: default\nname: quick\nexperiment: {epochs: 6, trials: 3, steps: 8, evaluate_every: 3, test_epochs: 1}\n"
 CHANGE = 3
 
 
