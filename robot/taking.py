@@ -13,8 +13,8 @@ __all__ = ["Taking", "has_come"]
 
 NOTHING_SENT = "it was lost before anything was sent to the arm: what runs there is somebody else's"
 WHILE_TAKING = (
-    "it was lost while it took command, when no watchdog may have been armed yet: a program that it left is ended as "
-    "soon as the controller can be reached, for 2 s; after that look at the pendant"
+    "it was lost while it took command, when no watchdog may have been armed yet: a program that it left, known by its "
+    "name, is ended as soon as the controller can be reached, for 2 s; after that look at the pendant"
 )
 
 
@@ -52,7 +52,9 @@ class Taking:
         if self._address is None or self._leftover is None:
             yield None
             return
+        self._leftover.listen()
         watch = TakingWatch(self._address, when_lost=end)
+        is_lost = False
         try:
             with watch:
                 yield watch.alarm
@@ -61,8 +63,16 @@ class Taking:
                 raise
             if not self.uploaded[0]:
                 raise type(error)(f"{watch.why or error}; {NOTHING_SENT}") from error
+            foreign = self._leftover.foreign()
+            is_lost = True
             self._leftover.begin()
-            raise type(error)(f"{watch.why or error}; {WHILE_TAKING}") from error
+            what = watch.why or str(error)
+            if foreign is not None and repr(foreign) not in what:
+                what = f"{what}; somebody started the program {foreign!r} on the controller meanwhile"
+            raise type(error)(f"{what}; {WHILE_TAKING}") from error
+        finally:
+            if not is_lost:
+                self._leftover.wait()
 
     def wait(self) -> None:
         """Wait until what a loss left is ended, or cannot be."""

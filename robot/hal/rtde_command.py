@@ -19,6 +19,7 @@ from robot.errors import ArmRefusedError, StaleStateError
 from robot.hal.obedience import LOOK_TICKS, Obedience
 from robot.hal.pins import Pins
 from robot.hal.primary_watch import PrimaryWatch
+from robot.hal.programs_told import OURS
 from robot.hal.protocols import Clock
 from robot.hal.rtde_links import RtdeLinks
 from robot.hal.rtde_outputs import N_OUTPUTS, DigitalOutputs
@@ -39,6 +40,11 @@ ALL_BITS = (1 << N_OUTPUTS) - 1
 
 PRIMARY_TICKS = 5
 """Of 2 ms, between two looks at who has started something on the controller."""
+SET_UP_S = 4.0
+"""Longer than the watchdog's proof takes, and what is set: a call that another program came amid waits for 300 s."""
+PLAYING_NS, BEGUN_NS, TOLD_NS = 5_000_000_000, 1_000_000_000, 300_000_000
+"""How long an upload is waited for to begin, where it is to be used and where to be ended, and what the state shows
+already to be told by name."""
 STOP_RAD_S2, STOP_S = 10.0, 2.0
 """How an arm that is told to stop brakes, and how long the client may take over it: where another program came up
 meanwhile it would wait 300 s for that one's answer."""
@@ -70,6 +76,8 @@ class RtdeCommand:
         self.outputs: DigitalOutputs | None = None
         self._primary = PrimaryWatch(address, tool=(*tool.tcp_m, 0.0, 0.0, 0.0))
         self._obedience, self._n_looks = Obedience(), 0
+        self._is_taken = False
+        """Command was taken whole: the program that obeys is known to be ours."""
         self._was_seen = self._has_ended = self._was_replaced = False
         """Our program was seen to run since it was uploaded, and to have ended: what runs after that is not ours."""
 
@@ -82,22 +90,33 @@ class RtdeCommand:
             clock: the arm's ticks.
 
         Raises:
-            ArmRefusedError: the controller did not take something, or its watchdog does not work.
+            ArmRefusedError: the controller did not take something, its watchdog does not work, or somebody started a
+                program meanwhile.
             StaleStateError: a link was lost.
+            WireError: a port that is needed does not answer.
             RuntimeError: the client's own.
         """
         receive, _ = self._readers()
+        self._is_taken = False
         self._links.begin_guard(receive.getTimestamp)
-        self.control = self._connected()
-        prove_watchdog(self.control, receive, clock)
+        self._primary.begin(clock)
+        self.control = self._connected(clock)
+        self._await_ours(clock)
+        try:
+            with self._in_time(SET_UP_S):
+                prove_watchdog(self.control, receive, clock)
+        except ArmRefusedError:
+            self._require_unchanged()  # that somebody's program came amid it says more
+            raise
         self._links.require()
         self._links.pause()
         self.control = None
         self._links.look()
-        self.control = self._connected()
+        self.control = self._connected(clock)
+        self._await_ours(clock)
         self._set_up(self.control, receive, clock)
         self._links.require()
-        self._was_seen = True  # it carried out what it was set up with
+        self._was_seen = self._is_taken = True  # it carried out what it was set up with
 
     def note(self, runtime: int) -> None:
         """Take note of a runtime state that was read: of our program's, once that was seen to run."""
@@ -203,16 +222,16 @@ class RtdeCommand:
         Returns:
             Whether the program has ended, and no coil of a drive is left with current.
         """
-        is_ended = True
+        is_taken, self._is_taken = self._is_taken, False
+        with suppress(RuntimeError, StaleStateError):
+            self._await_begun(clock)
         is_replaced = self.is_replaced()
-        self._primary.close()
         if is_replaced:
+            self._primary.close()
             return False
-        if self.control is not None:
-            receive, dashboard = self._readers()
-            with self._in_time(STOP_S):
-                is_ended = end_program(self.control, receive, dashboard, clock)
+        is_ended = self._end(clock) if is_taken else self._end_by_name(clock)
         is_ended = self._rest_outputs() and is_ended
+        self._primary.close()
         outputs, self.outputs = self.outputs, None
         if self._links.is_lost_now:
             return False
@@ -234,6 +253,32 @@ class RtdeCommand:
             return outputs.put(self._pins.rested(outputs.bits)) is None
         return False
 
+    def _end(self, clock: Clock) -> bool:
+        """End the program that runs, where it is ours. Returns whether none is left."""
+        receive, dashboard = self._readers()
+        with self._in_time(STOP_S):
+            return end_program(self.control, receive, dashboard, clock, self._is_ours)
+
+    def _is_ours(self) -> bool:
+        """Look whether what runs is ours: by name, or because nobody has replaced what was known to be."""
+        is_replaced = self.is_replaced()
+        return not is_replaced and (self._was_seen or self._primary.told.is_ours)
+
+    def _end_by_name(self, clock: Clock) -> bool:
+        """End what was uploaded on a way that was broken off: until it is told by name to have ended, it has not.
+
+        That no program runs at an instant says little here: ours may be about to begin. What was uploaded and not told
+        to have begun is not waited for again.
+        """
+        told = self._primary.told
+        if not told.may_be_ours:
+            return True
+        is_ended, end_ns = self._end(clock), monotonic_ns() + TOLD_NS
+        while is_ended and told.is_ours and self._primary.is_open and monotonic_ns() < end_ns:
+            clock.wait_tick()
+            self._primary.look()
+        return is_ended and not told.may_be_ours
+
     def end(self) -> None:
         """End the clients that a lost link has left, where this process goes on: they would go on by themselves."""
         self._primary.close()
@@ -251,10 +296,12 @@ class RtdeCommand:
         self._links.is_lost = True
         return StaleStateError(f"{what}: expected it sent, the client lost its link and does not get it back: {error}")
 
-    def _connected(self) -> RTDEControlInterface:
+    def _connected(self, clock: Clock) -> RTDEControlInterface:
         probe_upload(self._address)
+        self._require_nobodys(clock)
         self._links.when_uploading()
         self._was_seen = self._has_ended = self._was_replaced = False
+        self._primary.told.expect()
         with self._in_time():
             control = RTDEControlInterface(self._address, RATE_HZ, RTDEControlInterface.FLAG_UPLOAD_SCRIPT)
         self._links.look()
@@ -266,11 +313,70 @@ class RtdeCommand:
 
     def _set_up(self, control: RTDEControlInterface, receive: RTDEReceiveInterface, clock: Clock) -> None:
         """Set payload and tool centre point, open the outputs, listen to what changes, arm the watchdog last."""
-        set_tool(control, receive, clock, self._tool)
+        with self._in_time(SET_UP_S):
+            set_tool(control, receive, clock, self._tool)
         with self._in_time():
             self.outputs = DigitalOutputs(self._address, bits=receive.getActualDigitalOutputBits() & ALL_BITS)
         self._links.look()
         self._pins.forget()
         self._obedience.seed()
-        self._primary.begin(clock)
-        arm_watchdog(control, receive, clock)  # from here on somebody must write
+        self._primary.mind_tool(clock)
+        self._require_unchanged()
+        with self._in_time(SET_UP_S):
+            arm_watchdog(control, receive, clock)  # from here on somebody must write
+        self._require_unchanged()
+
+    def _require_nobodys(self, clock: Clock) -> None:
+        """Look that no program runs: to be made, the client stops whatever does.
+
+        Raises:
+            ArmRefusedError: one does, or somebody started one.
+        """
+        receive, _ = self._readers()
+        self._require_unchanged()
+        if int(receive.getRuntimeState()) in (Runtime.STOPPING, Runtime.STOPPED):
+            return
+        end_ns = monotonic_ns() + TOLD_NS
+        while monotonic_ns() < end_ns:  # its name may come after the state that shows it
+            self._require_unchanged()
+            clock.wait_tick()
+        running = self._primary.told.running
+        which = "one" if running is None else repr(running)
+        raise ArmRefusedError(
+            f"arm: expected no program on its controller, {which} is running: whoever started it must stop it"
+        )
+
+    def _await_ours(self, clock: Clock) -> None:
+        """Wait until the controller tells that our program has begun: that one runs does not say whose it is.
+
+        Raises:
+            ArmRefusedError: it does not, or somebody started another.
+        """
+        self._await_begun(clock, within_ns=PLAYING_NS)
+        self._require_unchanged()
+        told = self._primary.told
+        if not told.is_ours:
+            raise ArmRefusedError(
+                f"arm: expected its controller to tell on the primary interface that {OURS!r} was started, came: "
+                f"{'nothing' if told.n_due else 'that it has ended'}"
+            )
+
+    def _await_begun(self, clock: Clock, *, within_ns: int = BEGUN_NS) -> None:
+        """Hear what has begun; what of ours was uploaded and has not is waited for, for a while."""
+        self._primary.look()
+        end_ns = monotonic_ns() + within_ns
+        while self._primary.told.n_due > 0 and self._primary.is_open and monotonic_ns() < end_ns:
+            clock.wait_tick()
+            self._primary.look()
+
+    def _require_unchanged(self) -> None:
+        """Raise ArmRefusedError where somebody changed something since it is listened, or nothing is heard any more."""
+        changed, told = self._primary.look(), self._primary.told
+        if told.foreign is not None:
+            now = "runs there" if told.running == told.foreign else "has ended: our client ends what begins amid this"
+            raise ArmRefusedError(
+                f"arm: somebody started the program {told.foreign!r} on its controller while command was taken; it "
+                f"{now}"
+            )
+        if changed is not None:
+            raise ArmRefusedError(f"arm: {changed[1]}")

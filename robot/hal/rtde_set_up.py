@@ -1,5 +1,6 @@
 """What a control client must bear out before anything moves, the watchdog, payload and tool, and how it is ended."""
 
+from collections.abc import Callable
 from contextlib import suppress
 from time import monotonic_ns
 
@@ -104,18 +105,32 @@ def _await_playing(receive: RTDEReceiveInterface, clock: Clock, deadline_ns: int
 
 
 def end_program(
-    control: RTDEControlInterface, receive: RTDEReceiveInterface, dashboard: DashboardClient, clock: Clock
+    control: RTDEControlInterface | None,
+    receive: RTDEReceiveInterface,
+    dashboard: DashboardClient,
+    clock: Clock,
+    is_ours: Callable[[], bool],
 ) -> bool:
     """End the client's program, and what a stop has only paused: nothing may go on by itself when that is released.
+
+    Args:
+        control: the client; None where it could not be made, which may have uploaded its program all the same.
+        receive: tells what runs.
+        dashboard: ends what runs, whosever it is.
+        clock: the arm's ticks.
+        is_ours: whether what runs now is not somebody else's.
 
     Returns:
         Whether it was seen to have ended. In local control nobody but a person at the pendant can end what is paused.
     """
     with suppress(RuntimeError):
-        control.stopScript()
-        if _await_end(receive, clock):
-            return True
+        if control is not None:
+            control.stopScript()
+            if _await_end(receive, clock):
+                return True
     is_asked = False
+    if not is_ours():
+        return False
     with suppress(RuntimeError):
         dashboard.stop()
         is_asked = True  # its answer comes before the state that shows it

@@ -16,7 +16,7 @@ from tests.support.loopback import own_address
 
 pytestmark = pytest.mark.realtime
 
-SCRIPT = b"def waits():\n  while True:\n    sync()\n  end\nend\n"
+SCRIPT = b"def %s():\n  while True:\n    sync()\n  end\nend\n"
 SECONDARY = 30002
 
 
@@ -30,9 +30,9 @@ def runtime(host):
     return ask_fault(host, "truth")["runtime"]
 
 
-def play(host):
+def play(host, name=b"rtde_control"):
     with socket.create_connection((host, SECONDARY)) as link:
-        link.sendall(SCRIPT)
+        link.sendall(SCRIPT % name)
         end_s = monotonic() + 5.0
         while runtime(host) != "PLAYING" and monotonic() < end_s:
             sleep(0.01)
@@ -62,6 +62,18 @@ def test_what_begins_once_it_is_over_is_somebodys_and_runs_on(host):
     play(host)
     sleep(0.3)
     assert runtime(host) == "PLAYING"
+
+
+def test_what_runs_under_another_name_is_somebodys_and_runs_on(host):
+    ask_fault(host, "program_stop")
+    leftover = Leftover(host)
+    leftover.listen()
+    play(host, b"palletise")
+    assert leftover.foreign() == "palletise"
+    leftover.begin()
+    assert leftover.wait()
+    assert runtime(host) == "PLAYING"
+    ask_fault(host, "program_stop")
 
 
 def test_where_nobody_answers_it_gives_up_in_time():

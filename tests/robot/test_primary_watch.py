@@ -35,6 +35,20 @@ class Ticks:
         """What was sent is there already."""
 
 
+OTHER_TOOL = (0.0, 0.0, 0.4, 0.0, 0.0, 0.0)
+
+
+class Sending:
+    """Sends, at the first tick, what is heard at those that follow."""
+
+    def __init__(self, link, *sent):
+        self._link, self._sent = link, b"".join(sent)
+
+    def wait_tick(self):
+        sent, self._sent = self._sent, b""
+        self._link.sendall(sent)
+
+
 @contextmanager
 def listening(*before):
     """Yield a watch that has begun, and the controller's end of its link."""
@@ -51,6 +65,8 @@ def listening(*before):
 
         watch.begin(Accepting())
         with begun[0] as link:
+            watch.told.expect()
+            watch.mind_tool(Sending(link, started("rtde_control"), state(OTHER_TOOL), state()))
             yield watch, link
         watch.close()
 
