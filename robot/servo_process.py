@@ -289,14 +289,15 @@ class ServoServer:
             self._send(Failure(kind=SafetyError.__name__, message="expected an engaged arm; engage and seed it first"))
             return
         self._grip = request.grip
+        n_left = max(n_ticks - self._n_over, n_ticks - n_ticks // 2)
         self._is_beginning = True
         verdict = self._untimely(request.sequence, heard_ns) or self._loop.begin(
             unpack_intent(request.intent), n_ticks=n_ticks, wait_at_m=request.wait_at_m, around=request.around,
-            asked_ns=asked_ns,
+            n_left=n_left, asked_ns=asked_ns,
         )  # fmt: skip
         self._is_beginning = False
         if verdict is None:
-            self._n_left = max(n_ticks - self._n_over, n_ticks - n_ticks // 2)
+            self._n_left = n_left
         else:
             self._end_unless_stopped()
 

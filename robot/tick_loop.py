@@ -282,6 +282,7 @@ class TickLoop:
         n_ticks: int,
         wait_at_m: Vec3 | None = None,
         around: Surroundings | None = None,
+        n_left: int | None = None,
         asked_ns: int | None = None,
     ) -> Verdict | None:
         """Begin to carry out an intent; ticks do the rest. Returns the gate's refusal, if it refused.
@@ -294,6 +295,7 @@ class TickLoop:
             n_ticks: how long.
             wait_at_m: as in `stride`.
             around: as in `stride`.
+            n_left: how many of these ticks are still to come; None for all.
             asked_ns: when it was asked for, arm's time; None where that was now.
         """
         before, now_ns = self.state, self._arm.clock.now_ns()
@@ -302,7 +304,7 @@ class TickLoop:
             return self._told(verdict)
         if wait_at_m is not None and not all(map(isfinite, wait_at_m)):
             return self.latch(Reason.NOT_FINITE, f"expected a place to wait at, came {wait_at_m}")
-        self._n_asked, self._is_resting = n_ticks, False
+        self._n_asked, self._is_resting = n_ticks if n_left is None else n_left, False
         self._intent_ns = now_ns if asked_ns is None else asked_ns
         if around is not None:
             self.perceive(around)
