@@ -1,12 +1,14 @@
 """`autotelic cell`: walk through a cell's wires with a person, or with the truth of a virtual table. The edge."""
 
 import os
+import signal
 import stat
 import sys
 import time
-from collections.abc import Callable
-from contextlib import AbstractContextManager, ExitStack
-from typing import Annotated
+from collections.abc import Callable, Generator
+from contextlib import AbstractContextManager, ExitStack, contextmanager, suppress
+from types import FrameType
+from typing import TYPE_CHECKING, Annotated
 
 import msgspec
 import typer
@@ -27,7 +29,11 @@ from robot.rigs import check_usable
 
 __all__ = ["app"]
 
+if TYPE_CHECKING:
+    from robot.hal.ur_terminals import UrTerminals
+
 PATIENCE_S, POLL_S = 20.0, 0.02
+ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 app = typer.Typer(no_args_is_help=True, help="The table's wiring at the control box.")
 
@@ -76,9 +82,13 @@ def _walk(resolved: Resolved, *, is_auto: bool) -> list[Finding]:
         )
     with ExitStack() as stack:
         somebody = stack.enter_context(_truth_of(rig)) if is_auto else _person()
-        terminals = stack.enter_context(UrTerminals(rig.address))
+        terminals = stack.enter_context(_restoring(UrTerminals(rig.address)))
         check_serial(terminals.serial, rig.expected.serial, rig.address)
         inputs, outputs = wires_of(resolved.scenario, cell)
+        if is_auto and cell.arming_signal is not None:
+            typer.echo("the arming button is left out: a virtual table has nobody to press it", err=True)
+        else:
+            inputs += arming_wires(cell)
         return check_cell_wires(
             cell=cell,
             inputs=inputs,
@@ -88,6 +98,75 @@ def _walk(resolved: Resolved, *, is_auto: bool) -> list[Finding]:
             now_ns=time.monotonic_ns,
             wait_s=time.sleep,
         )
+
+
+@contextmanager
+def _restoring(terminals: "UrTerminals") -> "Generator[UrTerminals]":
+    """Enter the terminals; however the walk ends, a signal too, they are left as they were, and it is said if so.
+
+    Raises:
+        typer.Exit: a signal ended it, once the outputs are restored.
+    """
+    with _raising_signals():
+        try:
+            with terminals:
+                yield terminals
+        except _Ended as ended:
+            _tell(f"ended by {ended.number.name}: {_how_left(terminals)}")
+            raise typer.Exit(128 + ended.number) from None
+        except BaseException:
+            if terminals.is_switched:
+                _tell(_how_left(terminals))
+            raise
+
+
+def _how_left(terminals: "UrTerminals") -> str:
+    if not terminals.is_switched:
+        return "nothing was switched"
+    if terminals.is_restored:
+        return "the outputs are as they were"
+    return (
+        "NOT CONFIRMED that the outputs are as they were: look at the lamps and lids, and see that no coil has current"
+    )
+
+
+def _tell(text: str) -> None:
+    with suppress(OSError):  # the terminal may be what has gone
+        typer.echo(text, err=True)
+
+
+class _Ended(BaseException):
+    """A signal asks the walk to end."""
+
+    def __init__(self, number: signal.Signals) -> None:
+        super().__init__(number)
+        self.number = number
+
+
+@contextmanager
+def _raising_signals() -> Generator[None]:
+    """Turn the first signal that asks for an end into an exception; later ones wait for what it makes unwind."""
+
+    def hear(number: int, frame: FrameType | None) -> None:  # noqa: ARG001
+        for each in ENDING:
+            signal.signal(each, signal.SIG_IGN)
+        raise _Ended(signal.Signals(number))
+
+    before = {number: signal.signal(number, hear) for number in ENDING}
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def arming_wires(cell: CellConfig) -> tuple[Wire, ...]:
+    """Return the wire of the button that arms, where a cell has one."""
+    return tuple(
+        Wire(signal=w.signal, name="arming", what="button", pin=w.pin, inverted=w.inverted)
+        for w in cell.inputs
+        if w.signal == cell.arming_signal
+    )
 
 
 def wires_of(scenario: Scenario, cell: CellConfig) -> tuple[tuple[Wire, ...], tuple[Wire, ...]]:

@@ -1,11 +1,12 @@
 """A person at the terminal: is told things, presses Enter, and arms an arm that nobody else may. The edge."""
 
 import os
+import secrets
 import select
 import sys
 import termios
 from collections.abc import Callable
-from time import sleep
+from time import monotonic, sleep
 from typing import Protocol
 
 import typer
@@ -15,12 +16,16 @@ from robot.messages import StationMode
 from robot.safety.arming import Armable
 from robot.safety.challenge import LIFE_NS, Answer, AnsweredBy
 
-__all__ = ["Person", "PersonOperator", "TerminalPerson"]
+__all__ = ["Person", "PersonOperator", "TerminalPerson", "draw_digits"]
 
+N_TYPED_AHEAD = 3
+"""So often keys may come before a question without a word about it."""
 LOOK_S = 0.01
 """How long between two looks at the arming button."""
 KEY_S = 0.02
 """How long between two looks at the keyboard, where there is something to do meanwhile."""
+QUIET_S = 0.3
+"""So long nothing may come from the keyboard before a question: what lies on a key answers none."""
 
 
 class Person(Protocol):
@@ -38,6 +43,10 @@ class Person(Protocol):
         """Ask for a word and return it. Raises SafetyError where nobody is there any more."""
         ...
 
+    def confirm(self, text: str) -> None:
+        """Say what is to be done and wait for what a held key cannot type. Raises SafetyError where nobody is there."""
+        ...
+
 
 class TerminalPerson:
     """Implements Person on standard error and standard input.
@@ -45,10 +54,11 @@ class TerminalPerson:
     Args:
         meanwhile: called again and again while the person is waited for; what it raises ends the waiting. Only what is
             typed after a question answers it then.
+        draw: two digits to be typed back.
     """
 
-    def __init__(self, meanwhile: Callable[[], object] | None = None) -> None:
-        self._meanwhile = meanwhile
+    def __init__(self, meanwhile: Callable[[], object] | None = None, *, draw: Callable[[], str] | None = None) -> None:
+        self._meanwhile, self._draw = meanwhile, draw or draw_digits
 
     def tell(self, text: str) -> None:
         """Print a line."""
@@ -74,6 +84,19 @@ class TerminalPerson:
         typer.echo(f"{text}, then Enter: ", err=True)
         return self._line("word")
 
+    def confirm(self, text: str) -> None:
+        """Print a line and two digits, and wait until they are typed: the arm moves next, Enter alone is not enough.
+
+        Raises:
+            SafetyError: the input has ended.
+        """
+        while True:
+            digits = self._draw()
+            typed = self.ask(f"{text}: type {digits}")
+            if typed == digits:
+                return
+            self.tell(f"expected {digits}, came {typed[:20]!r}: the arm waits")
+
     def _line(self, what: str) -> str:
         line = sys.stdin.readline() if self._meanwhile is None else self._awaited(self._meanwhile)
         if not line:
@@ -97,14 +120,26 @@ class TerminalPerson:
         return typed.partition(b"\n")[0].decode(errors="replace") + "\n"
 
     def _forget_typed(self) -> None:
-        """Forget what was typed before a question: it answered another one, which may be void by now."""
+        """Forget what was typed before a question, which answered another one; go on once no more comes for 0.3 s.
+
+        What lies on a key types on: it is waited for, for as long as it lies there.
+        """
         if sys.stdin is None or not (sys.stdin.isatty() or self._meanwhile):
             return
         keyboard = sys.stdin.fileno()
         if os.isatty(keyboard):
             termios.tcflush(keyboard, termios.TCIFLUSH)
-        while self._meanwhile is not None and select.select([keyboard], [], [], 0.0)[0] and os.read(keyboard, 4096):
-            pass
+        end_s, n_came = monotonic() + QUIET_S, 0
+        while monotonic() < end_s:
+            if self._meanwhile is not None:
+                self._meanwhile()
+            if not select.select([keyboard], [], [], KEY_S)[0]:
+                continue
+            if not os.read(keyboard, 4096):
+                return
+            end_s, n_came = monotonic() + QUIET_S, n_came + 1
+            if n_came == N_TYPED_AHEAD:
+                self.tell("something is typing though nothing is asked: is anything lying on the keyboard?")
 
 
 class PersonOperator:
@@ -162,7 +197,7 @@ class PersonOperator:
     def clear(self, station: Armable) -> None:
         """Clear a latch when the person answers what the cell shows; the arm is still nobody's after it."""
         station.clear_latch(by=self.name, answer=self._answer(station))
-        self._person.await_key("the latch is cleared; the arm is taken again next: stand clear")
+        self._person.confirm("the latch is cleared; the arm is taken again next: stand clear")
 
     def _answer(self, station: Armable) -> Answer:
         """Let the cell ask, and the person answer. A console shows the code itself only where nothing else can."""
@@ -181,3 +216,9 @@ class PersonOperator:
             if answer is not None:
                 return answer
             self._wait(LOOK_S)
+
+
+def draw_digits() -> str:
+    """Return two digits that differ: no one key types them, however long it is held."""
+    first, step = secrets.randbelow(10), 1 + secrets.randbelow(9)
+    return f"{first}{(first + step) % 10}"

@@ -80,7 +80,7 @@ class PersonResetter:
             unseen = self._unseen_where_in_place(layout)
             if unseen is not None:
                 on_word = "".join(f"; {name} is taken on your word to be in {box}" for name, box in unseen.items())
-                self._person.await_key(
+                self._person.confirm(
                     f"everything that can be seen is in place{on_word}; take your hands off the table, the arm moves "
                     "next"
                 )
@@ -121,7 +121,7 @@ class PersonLook:
         del seed, epoch, digital_out
         self._loop.stop()
         self._loop.await_rest()
-        self._person.await_key("the arm is disarmed: see to what is wrong at the table, take your hands off it")
+        self._person.confirm("the arm is disarmed: see to what is wrong at the table, take your hands off it")
 
 
 def unseen_under_lids(scene: SceneState, scenario: Scenario) -> dict[str, str]:

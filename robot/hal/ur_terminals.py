@@ -3,6 +3,7 @@
 Neither of them uploads a program, stops one, or holds a register that a motion is commanded by.
 """
 
+import time
 from contextlib import suppress
 from types import TracebackType
 from typing import Self
@@ -13,12 +14,16 @@ from rtde_receive import RTDEReceiveInterface
 from robot.errors import ArmRefusedError, WireError
 from robot.hal.rtde_outputs import N_OUTPUTS, DigitalOutputs
 from robot.hal.rtde_probe import probe_rtde
-from robot.hal.ur_state import Runtime
+from robot.hal.ur_primary import read_facts
+from robot.hal.ur_state import Runtime, check_version
 
 __all__ = ["UrTerminals"]
 
 RATE_HZ = 125.0
 ALL_BITS = (1 << N_OUTPUTS) - 1
+RESTORED_S, LOOK_S = 0.5, 0.01
+"""How long outputs may take to read as they were, and how long between two looks."""
+IDLE = (Runtime.STOPPED, Runtime.STOPPING)
 
 
 class UrTerminals:
@@ -29,6 +34,8 @@ class UrTerminals:
 
     Attributes:
         serial: As the controller says.
+        is_switched: An output was switched since.
+        is_restored: Left, with the outputs read as they were when it was entered.
     """
 
     def __init__(self, address: str) -> None:
@@ -37,14 +44,17 @@ class UrTerminals:
         self._outputs: DigitalOutputs | None = None
         self._before = 0
         self.serial = ""
+        self.is_switched = self.is_restored = False
 
     def __enter__(self) -> Self:
         """Connect, and remember how the outputs are.
 
         Raises:
             WireError: the controller does not answer.
+            RobotConfigError: it is another kind of controller than this package is for.
             ArmRefusedError: a program runs on it, which would have a word in its outputs too.
         """
+        read_facts(self._address, greeted=check_version)  # PolyScope X has no dashboard that could be asked
         try:
             probe_rtde(self._address)
             dashboard = DashboardClient(self._address)
@@ -52,7 +62,7 @@ class UrTerminals:
             self.serial = dashboard.getSerialNumber().strip()
             dashboard.disconnect()
             self._receive = receive = RTDEReceiveInterface(self._address, RATE_HZ)
-            is_free = int(receive.getRuntimeState()) in (Runtime.STOPPED, Runtime.STOPPING)
+            is_free = int(receive.getRuntimeState()) in IDLE
             if is_free:
                 self._before = self.outputs()
                 self._outputs = DigitalOutputs(self._address, bits=self._before)
@@ -69,27 +79,43 @@ class UrTerminals:
     ) -> None:
         """Put the outputs back to what they were, and disconnect."""
         with suppress(WireError):
-            self.put(self._before)
+            self._switch(self._before)
+            self.is_restored = self._is_as_it_was()
         self.close()
 
     def inputs(self) -> int:
-        """Return the input terminals as bits."""
-        assert self._receive is not None, "entered"
-        return self._receive.getActualDigitalInputBits() & ALL_BITS
+        """Return the input terminals as bits.
+
+        Raises:
+            WireError: the link was lost.
+            ArmRefusedError: a program has begun on the arm.
+        """
+        return self._free().getActualDigitalInputBits() & ALL_BITS
 
     def outputs(self) -> int:
-        """Return the output terminals as bits, as the controller has them."""
-        assert self._receive is not None, "entered"
-        return self._receive.getActualDigitalOutputBits() & ALL_BITS
+        """Return the output terminals as bits, as the controller has them. Raises WireError where the link was lost."""
+        return self._linked().getActualDigitalOutputBits() & ALL_BITS
 
     def put(self, pins: int) -> None:
         """Switch the output terminals that differ.
 
         Raises:
-            ArmRefusedError: the controller did not take one.
+            WireError: the link was lost.
+            ArmRefusedError: the controller did not take one, or a program has begun on the arm.
         """
+        self._free()
         assert self._outputs is not None, "entered"
-        untaken = self._outputs.put(pins)
+        self.is_switched |= pins != self._outputs.bits
+        self._switch(pins)
+
+    def _switch(self, pins: int) -> None:
+        """Switch terminals, whatever runs on the arm: so they return to what they were."""
+        assert self._outputs is not None, "entered"
+        self._linked()
+        try:
+            untaken = self._outputs.put(pins)
+        except RuntimeError as error:
+            raise WireError(self._lost(str(error))) from error
         if untaken is not None:
             raise ArmRefusedError(f"digital output {untaken}: the controller did not take it")
 
@@ -101,3 +127,35 @@ class UrTerminals:
         if receive is not None:
             with suppress(RuntimeError):
                 receive.disconnect()
+
+    def _linked(self) -> RTDEReceiveInterface:
+        """Return the reading client. Raises WireError where its link was lost: what it says then is old."""
+        assert self._receive is not None, "entered"
+        if not self._receive.isConnected():
+            raise WireError(self._lost("nothing comes any more"))
+        return self._receive
+
+    def _free(self) -> RTDEReceiveInterface:
+        """Return the reading client. Raises ArmRefusedError where a program runs by now, WireError where it is lost."""
+        receive = self._linked()
+        if int(receive.getRuntimeState()) not in IDLE:
+            raise ArmRefusedError(
+                "expected no program on the arm, one has begun since: whoever started it must stop it, it has a word "
+                "in the outputs too; then walk again"
+            )
+        return receive
+
+    def _lost(self, why: str) -> str:
+        return (
+            f"terminals: the link to {self._address} was lost ({why}): is the controller on, and its cable in? Then "
+            "walk again"
+        )
+
+    def _is_as_it_was(self) -> bool:
+        """Return whether the outputs come to read as they were."""
+        end_s = time.monotonic() + RESTORED_S
+        while self.outputs() != self._before:
+            if time.monotonic() > end_s:
+                return False
+            time.sleep(LOOK_S)
+        return True

@@ -173,6 +173,9 @@ class Presser:
     def await_key(self, text):
         self.keys.append(text)
 
+    def confirm(self, text):
+        self.await_key(text)
+
     def ask(self, text):
         raise AssertionError(text)
 

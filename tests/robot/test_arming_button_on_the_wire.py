@@ -47,6 +47,9 @@ class Finger:
     def await_key(self, text):
         self.told.append(text)
 
+    def confirm(self, text):
+        self.await_key(text)
+
     def ask(self, text):
         raise AssertionError(text)
 

@@ -78,7 +78,7 @@ def test_where_a_person_sees_to_the_table_the_arm_is_let_go_of_first():
             done.append("rest")
 
     class Somebody:
-        def await_key(self, text):
+        def confirm(self, text):
             done.append(text)
 
     PersonLook(loop=Loop(), person=Somebody()).reset(seed=1, epoch=0, digital_out=0)

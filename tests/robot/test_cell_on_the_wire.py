@@ -2,15 +2,20 @@
 
 import json
 import re
+import signal
 import socket
 import subprocess
+import time
 
+import msgspec
 import pytest
 import yaml
 
+from config.cell import CellInput
 from config.loader import resolve
 from robot.bus.virtual_table import VirtualSomebody
 from robot.cell_check import Wire
+from robot.cell_cli import arming_wires
 from robot.errors import RobotConfigError, RobotError
 from robot.hal.rtde_plant import RtdePlant
 from robot.messages import ArmCommand, GripCommand
@@ -253,3 +258,111 @@ def test_a_program_that_replaces_ours_in_a_pulse_leaves_no_coil_under_current(la
     finally:
         arm.close()
         controller.fault("program_stop")
+
+
+ODD_LID = CELL.replace("pulse_s: 0.1", "pulse_s: 5.0")
+SEND = b"def other():\n while True:\n  sync()\n end\nend\n"
+
+
+@pytest.fixture
+def walked(tmp_path):
+    """A lab of its own, and somebody's walk in it that has come to the outputs."""
+    host = "127.0.0.63"
+    make_lab(tmp_path, host, cell=ODD_LID)
+    with (
+        controller_of(tmp_path, host, cell=str(tmp_path / "cell.yaml")) as controller,
+        start(
+            tmp_path, "cell", "test", "--rig", "rig.yaml", "--scenario", "small.yaml", stdin=subprocess.PIPE
+        ) as process,
+    ):
+        try:
+            for bits in (1 << 13, 1 << 0, 1 << 7):
+                asked_for(process, "...")
+                controller.fault("inputs", bits=bits)
+                asked_for(process, "...")
+                controller.fault("inputs", bits=0)
+            asked_for(process, "Enter switches")
+            yield controller, process
+        finally:
+            process.kill()
+
+
+def asked_for(process, words):
+    said = ""
+    while words not in said:
+        letter = process.stderr.read(1)
+        assert letter, said
+        said += letter
+    return said
+
+
+def says(process, words):
+    process.stdin.write(words)
+    process.stdin.flush()
+
+
+def ended(process, said=""):
+    """Return exit code and what was said last, answering whatever is still asked."""
+    out, err = process.communicate(said, timeout=60)
+    assert "Traceback" not in err
+    assert "terminate called" not in err + out
+    return process.returncode, err
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP, signal.SIGINT])
+def test_a_signal_in_a_lids_pulse_leaves_the_outputs_as_they_were_and_says_so(walked, number):
+    controller, process = walked
+    before = controller.fault("truth")["digital_out"]
+    for _ in range(2):
+        says(process, "\ny\ny\n")
+        asked_for(process, "Enter switches")
+    says(process, "\n")
+    end_s = time.monotonic() + 20.0
+    while not controller.fault("truth")["digital_out"] & 1 << 6:
+        assert time.monotonic() < end_s
+    process.send_signal(number)
+    code, said = ended(process)
+    assert (code, controller.fault("truth")["digital_out"]) == (128 + number, before)
+    assert f"ended by {number.name}: the outputs are as they were" in said
+
+
+@pytest.mark.slow
+def test_a_controller_that_goes_amid_a_walk_ends_it_with_one_error_and_what_is_not_known(walked):
+    controller, process = walked
+    says(process, "\ny\n")
+    asked_for(process, "dark now?")
+    controller.__exit__(None, None, None)
+    code, said = ended(process, "y\n" * 10)
+    assert code == 1
+    assert said.count("error: ") == 1
+    assert "the link to 127.0.0.63 was lost" in said
+    assert "NOT CONFIRMED that the outputs are as they were" in said
+
+
+@pytest.mark.slow
+def test_a_program_that_begins_amid_a_walk_ends_it_in_words_and_the_outputs_are_as_they_were(walked):
+    controller, process = walked
+    before = controller.fault("truth")["digital_out"]
+    says(process, "\ny\n")
+    asked_for(process, "dark now?")
+    with socket.create_connection(("127.0.0.63", 30002), timeout=5.0) as link:
+        link.sendall(SEND)
+        link.recv(64)
+    end_s = time.monotonic() + 20.0
+    while controller.fault("truth")["runtime"] == "STOPPED":
+        assert time.monotonic() < end_s
+    code, said = ended(process, "y\n" * 10)
+    assert (code, controller.fault("truth")["digital_out"]) == (1, before)
+    assert "a word in the outputs too" in said.replace("\n", " ")
+    assert "the outputs are as they were" in said
+
+
+def test_the_button_that_arms_is_walked_to(lab):
+    folder, _ = lab
+    resolved = resolve(rig=folder / "rig.yaml", scenario=folder / "small.yaml")
+    assert arming_wires(resolved.cell) == ()
+    entry = CellInput(signal=9, pin="CI6", inverted=True)
+    cell = msgspec.structs.replace(resolved.cell, inputs=(*resolved.cell.inputs, entry), arming_signal=9)
+    (wire,) = arming_wires(cell)
+    assert (wire.label, wire.inverted) == ("arming button (CI6)", True)

@@ -26,7 +26,7 @@ class ScriptedPerson:
 
     def __init__(self, plant, home_rad):
         self.plant, self.home_rad = plant, np.array(home_rad)
-        self.asked, self.told, self.away_rad = [], [], []
+        self.asked, self.told, self.away_rad, self.confirmed = [], [], [], []
         self.at_key, self.seed = lambda n: None, SEED
 
     def tell(self, text):
@@ -39,6 +39,10 @@ class ScriptedPerson:
         if len(self.asked) == 2:
             self.lay_out(self.seed)
         self.at_key(len(self.asked))
+
+    def confirm(self, text):
+        self.await_key(text)
+        self.confirmed.append(text)
 
     def lay_out(self, seed):
         world = self.plant.world
@@ -171,6 +175,21 @@ def test_what_is_moved_after_it_was_in_place_is_seen_before_the_arm_moves(lab):
     person.at_key = meddle
     station.reset(seed=SEED, epoch=EPOCH)
     assert ["hands off" in text for text in person.asked] == [False, False, True, False, True]
+
+
+def test_hands_are_off_the_table_only_when_it_is_confirmed(lab):
+    station, resetter, person, _ = lab
+    resetter.reset(seed=SEED, epoch=EPOCH, digital_out=0)
+    assert ["hands off" in text for text in person.asked] == [False, False, True]
+    assert person.confirmed == person.asked[-1:]
+    station.arm(by="the test")
+    station.engage()
+    person.asked.clear()
+    held_rad = []
+    person.confirm = lambda text: held_rad.append(person.plant.arm.read().q_rad) or stop_asking()
+    with pytest.raises(SafetyError, match="nobody"):
+        station.reset(seed=SEED, epoch=EPOCH)
+    assert held_rad == [person.plant.arm.read().q_rad]
 
 
 def test_a_stop_that_nobody_confirmed_is_not_called_disarmed(lab, monkeypatch):

@@ -8,9 +8,12 @@ import msgspec
 import pytest
 
 from perception.ground_truth import GroundTruthPerception
+from robot.bus import Bus, Role
 from robot.errors import NotEngagedError, RobotConfigError, SafetyError, WireError
+from robot.hal.sole_holder import SoleHolder
 from robot.local_station import LocalStation
 from robot.messages import GripCommand, Heading, JointTarget, Outcome, PlantKind, StationMode, Verdict
+from robot.node.lab_node import open_robot_node
 from robot.rigs import build_plant
 from robot.servo_client import COAST_S, ServoClient
 from robot.servo_messages import StrideReply
@@ -18,6 +21,7 @@ from robot.servo_process import EXIT_TERMINATED
 from robot.tick_loop import Stride
 from robot.tick_ring import decode_tick
 from tests.support import unstoppable
+from tests.support.loopback import own_address
 from tests.support.stations import fake_rig
 
 pytestmark = pytest.mark.realtime
@@ -337,3 +341,50 @@ def stride_of(client):
         before=state, after=state, is_begun=False, target_m=(0.0, 0.0, 0.0), limiters=(), is_in_contact=False,
         verdict=verdict,
     )  # fmt: skip
+
+
+def at(address, **rig):
+    """Return the rig of a fake arm that says it is at an address."""
+    resolved = fake_rig()
+    return msgspec.structs.replace(resolved, rig=msgspec.structs.replace(resolved.rig, address=address, **rig))
+
+
+def test_a_second_client_of_an_address_is_refused_before_it_starts_a_process_until_the_first_is_closed():
+    address = own_address()
+    first, second = ServoClient(at(address)), ServoClient(at(address))
+    first.hold()
+    for take in (second.hold, second.connect, second.engage, second.measure):
+        with pytest.raises(WireError, match=f"{address}: another process of this machine holds it"):
+            take()
+        assert second.pid is None
+    first.hold()
+    first.close()
+    second.hold()
+    second.close()
+
+
+def test_a_client_that_connects_holds_its_address_though_nobody_told_it_to():
+    address = own_address()
+    client = ServoClient(at(address))
+    try:
+        client.connect()
+        with pytest.raises(WireError, match="another process"):
+            SoleHolder(address).take()
+    finally:
+        client.close()
+
+
+def test_a_robot_node_is_refused_before_anybody_asks_for_its_arm_and_holds_it_while_it_is_open():
+    address = own_address()
+    endpoint = f"tcp/{address}:7447"
+    resolved = at(address, bus=endpoint)
+    holder = SoleHolder(address)
+    with Bus(endpoint, serial=resolved.rig.expected.serial, role=Role.VIEWER, source="hub", is_hub=True):
+        holder.take()
+        with pytest.raises(WireError, match="another process of this machine holds it"), open_robot_node(resolved):
+            pass
+        holder.release()
+        with open_robot_node(resolved), pytest.raises(WireError, match="another process"):
+            holder.take()
+        holder.take()
+        holder.release()

@@ -178,3 +178,9 @@ def test_polyscope_x_is_refused_with_the_reason_before_its_missing_dashboard_is_
     rtde = pytest.importorskip("robot.hal.rtde", reason="the genuine client comes with `pip install autotelic[lab]`")
     with pytest.raises(RobotConfigError, match="PolyScope X"):
         rtde.RtdeArm(arm=ARM, address=polyscope_x).connect()
+
+
+def test_a_walk_through_its_wires_is_refused_at_polyscope_x_with_the_reason_too(polyscope_x):
+    terminals = pytest.importorskip("robot.hal.ur_terminals", reason="the genuine client comes with autotelic[lab]")
+    with pytest.raises(RobotConfigError, match="PolyScope X"):
+        terminals.UrTerminals(polyscope_x).__enter__()

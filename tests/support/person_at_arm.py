@@ -16,7 +16,7 @@ __all__ = ["AtTheArm", "attended"]
 
 
 class AtTheArm:
-    """Sits at the robot node's terminal: presses Enter, types codes, and lays the table out when told what is off."""
+    """Presses Enter, types what is shown, and lays the table out when told what is off."""
 
     def __init__(self, folder, controller):
         self.folder, self.controller = folder, controller
@@ -27,9 +27,9 @@ class AtTheArm:
     def answer(self, line):
         """Return what is typed at a line, None at one that asks nothing."""
         self.said.append(line)
-        code = re.search(r"the code is (\d+)", line)
+        code = re.search(r"the code is (\d+)|: type (\d\d), then Enter", line)
         if code:
-            return code[1]
+            return code[1] or code[2]
         if "Enter" not in line:
             return None
         asked = re.search(r"epoch (\d+), seed (\d+), as in (\S+);", line)

@@ -1,6 +1,7 @@
 """What a person at the arm is asked for over the bus: minutes pass, and the node is there for everybody meanwhile."""
 
 import os
+import pty
 import socket
 import threading
 import time
@@ -13,7 +14,7 @@ from robot.errors import RobotError, SafetyError
 from robot.messages import StationMode
 from robot.node import NodeAsker, RemoteStation, StopCaller
 from robot.operated import AskingOperator, OperatedStation
-from robot.person import TerminalPerson
+from robot.person import TerminalPerson, draw_digits
 from robot.safety import Answer
 from tests.support.robot_node import SERIAL, Node
 
@@ -167,17 +168,105 @@ def test_only_what_is_typed_after_a_question_answers_it(monkeypatch, capsys):
     with os.fdopen(reader) as keyboard:
         monkeypatch.setattr("sys.stdin", keyboard)
         os.write(writer, b"\nyes\n")
-        rounds = iter(range(3))
+        said = []
 
         def meanwhile():
-            if next(rounds, None) is None:
+            said.append(capsys.readouterr().err)
+            if "the code, then Enter" in said[-1]:
                 os.write(writer, b"4711\n")
 
         assert TerminalPerson(meanwhile).ask("the code") == "4711"
         os.close(writer)
         with pytest.raises(SafetyError, match="nobody is at the arm"):
             TerminalPerson(lambda: None).await_key("again")
-    assert "the code, then Enter" in capsys.readouterr().err
+
+
+class HeldKey:
+    """A terminal where something lies on Enter, 30 times a second, until it is taken away."""
+
+    def __init__(self):
+        self.master, slave = pty.openpty()
+        self.keyboard, self._away = os.fdopen(slave, "r"), threading.Event()
+        self.types = threading.Thread(target=self._type, daemon=True)
+        self.types.start()
+
+    def _type(self):
+        while not self._away.wait(1 / 30):
+            os.write(self.master, b"\n")
+            os.read(self.master, 4096)
+
+    def take_away(self):
+        self._away.set()
+        self.types.join()
+
+    def type(self, text):
+        os.write(self.master, text.encode())
+
+    def close(self):
+        self.take_away()
+        self.keyboard.close()
+        os.close(self.master)
+
+
+@pytest.fixture
+def held(monkeypatch):
+    terminal = HeldKey()
+    monkeypatch.setattr("sys.stdin", terminal.keyboard)
+    yield terminal
+    terminal.close()
+
+
+def test_nothing_is_asked_while_a_key_is_held_and_a_stop_ends_the_waiting(held, capsys):
+    rounds, said = iter(range(100)), []
+
+    def meanwhile():
+        said.append(capsys.readouterr().err)
+        if next(rounds, None) is None:
+            raise SafetyError("it is void")
+
+    with pytest.raises(SafetyError, match="it is void"):
+        TerminalPerson(meanwhile).await_key("hands off")
+    assert "hands off" not in "".join(said)
+    assert "".join(said).count("lying on the keyboard") == 1
+
+
+def test_enter_alone_does_not_confirm_nor_do_digits_that_were_shown_before(monkeypatch, capsys):
+    reader, writer = os.pipe()
+    answers, shown = iter([b"\n", b"41\n", b" 56 \n"]), iter(["41", "23", "56"])
+    said = []
+
+    def meanwhile():
+        said.append(capsys.readouterr().err)
+        if "hands off: type" in said[-1]:
+            os.write(writer, next(answers))
+
+    with os.fdopen(reader) as keyboard, os.fdopen(writer, "w"):
+        monkeypatch.setattr("sys.stdin", keyboard)
+        TerminalPerson(meanwhile, draw=lambda: next(shown)).confirm("hands off")
+    assert "".join(said).count("the arm waits") == 2
+    assert next(answers, None) is None
+
+
+def test_a_key_that_is_held_from_the_question_on_confirms_nothing(held, capsys):
+    """Auto-repeat begins after a pause: the quiet before a question may have been that."""
+    held.take_away()
+    said = []
+
+    def meanwhile():
+        said.append(capsys.readouterr().err)
+        if "hands off: type" in said[-1]:
+            held.type("\n" * 5)
+            if "".join(said).count("hands off: type") == 3:
+                raise SafetyError("it is void")
+
+    with pytest.raises(SafetyError, match="it is void"):
+        TerminalPerson(meanwhile).confirm("hands off")
+
+
+def test_digits_to_be_typed_back_differ_so_that_no_one_key_types_them():
+    drawn = {draw_digits() for _ in range(2000)}
+    assert len(drawn) > 80
+    assert all(len(digits) == len(set(digits)) == 2 and digits.isdigit() for digits in drawn)
 
 
 def test_waiting_for_a_person_ends_where_what_he_is_asked_for_is_void(monkeypatch):
