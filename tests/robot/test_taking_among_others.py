@@ -70,29 +70,6 @@ def test_one_that_begins_between_the_two_uploads_is_named_and_goes_on(host, arm,
     assert not arm.links.is_lost, "nothing of ours runs: this process may go on"
 
 
-def test_one_that_the_client_ended_is_named_and_no_program_of_ours_is_left(host, arm, monkeypatch):
-    client = taking.RTDEControlInterface
-
-    class Late:
-        """Made a moment after somebody has begun, which no look before could see."""
-
-        FLAG_UPLOAD_SCRIPT = client.FLAG_UPLOAD_SCRIPT
-
-        def __new__(cls, *arguments):
-            play_other(host)
-            return client(*arguments)
-
-    monkeypatch.setattr(taking, "RTDEControlInterface", Late)
-    with pytest.raises(ArmRefusedError, match="'other'"):
-        arm.engage()
-    end_s = time.monotonic() + 0.5
-    while time.monotonic() < end_s:
-        assert says(host).startswith("STOPPED")
-    monkeypatch.undo()
-    arm.engage()
-    assert arm.stop()
-
-
 def test_one_that_replaces_ours_before_its_watchdog_is_armed_is_named_and_not_ended(host, arm, monkeypatch):
     def replaced(*_):
         play_other(host)
