@@ -59,7 +59,8 @@ class Inbox:
 
     def stop(self) -> StopAsk | None:
         """Take the oldest stop out."""
-        return self._stops.popleft() if self._stops else None
+        with self._came:
+            return self._stops.popleft() if self._stops else None
 
     def command(self) -> Command | None:
         """Take the newest command out; what it overtook is gone."""
@@ -109,10 +110,10 @@ class Inbox:
             self._came.notify_all()
 
     def _take_stop(self, received: Received[StopAsk]) -> None:
-        with self._came:
+        with self._came:  # one with the other: whoever has carried a stop out ends its halt, and looks for the next one
             self._stops.append(received.message)
+            self._halt()
             self._came.notify_all()
-        self._halt()  # after it: whoever ends a halt looks for a stop that came meanwhile
 
     def _hear(self, received: Received[Beat]) -> None:
         deadline_s, age_ns = BEAT.deadline_s, received.age_ns

@@ -59,7 +59,7 @@ def controller(
     from sim_twin.controller.server import PRIORITY, ControllerServer, Setup
 
     try:
-        text = "" if script is None else script.read_text(encoding="utf-8")
+        text = "" if script is None else _program_of(script, is_powered=powered)
         setup = Setup(
             host=host,
             version=version,
@@ -68,14 +68,14 @@ def controller(
             is_powered=powered,
             is_any_host_allowed=allow_any,
             script=text,
-            shelf={path.name: path.read_text(encoding="utf-8") for path in program or []},
+            shelf=_once("--program", [(path.name, _program_of(path)) for path in program or []]),
             bus=bus,
             keys=keys,
             cell=cell,
             planes=tuple(map(parse_plane, plane or [])),
-            safety_inputs=dict(map(parse_safety_input, safety_input or [])),
+            safety_inputs=_once("--safety-input", [parse_safety_input(text) for text in safety_input or []]),
         )
-        server = ControllerServer(setup)
+        server = ControllerServer(setup, told=lambda words: typer.echo(words, err=True))
         with server:
             take_priority(PRIORITY)
             server.run(when_ready=lambda: typer.echo(f"virtual UR5e {version} ready on {host}"))
@@ -107,6 +107,41 @@ def fault(
     except ControllerProcessError as error:
         typer.echo(f"error: {error}", err=True)
         raise typer.Exit(1) from None
+
+
+def _program_of(path: Path, *, is_powered: bool = True) -> str:
+    """Return a program's text.
+
+    Args:
+        is_powered: Whether it could run at once.
+
+    Raises:
+        ValueError: there is none in the file, or it could not run.
+        OSError: it cannot be read.
+    """
+    if not is_powered:
+        raise ValueError(f"{path}: expected a robot with power for --script, got --unpowered: give it as --program")
+    try:
+        text = path.read_text(encoding="utf-8")
+    except UnicodeDecodeError as error:
+        raise ValueError(f"{path}: expected a program in UTF-8, byte {error.start} is none: save it as text") from error
+    if not text.strip():
+        raise ValueError(f"{path}: expected a program, the file is empty")
+    return text
+
+
+def _once(option: str, named: list[tuple[str, str]]) -> dict[str, str]:
+    """Return what is named, each name once: of two the controller could take one only.
+
+    Raises:
+        ValueError: a name comes twice.
+    """
+    found = dict(named)
+    if len(found) < len(named):
+        names = [name for name, _ in named]
+        twice = next(name for name in names if names.count(name) > 1)
+        raise ValueError(f"{option}: expected each name once, got {twice!r} twice: leave one out, or rename it")
+    return found
 
 
 def _argument(text: str) -> tuple[str, object]:

@@ -3,7 +3,7 @@
 import gc
 import sys
 from collections.abc import Callable
-from ipaddress import ip_address
+from ipaddress import IPv4Address, IPv6Address, ip_address
 from time import perf_counter
 from types import TracebackType
 from typing import Self
@@ -30,6 +30,8 @@ from sim_twin.controller.wire.rtde_codec import Level
 
 __all__ = ["PRIORITY", "ControllerServer", "Setup", "parse_version"]
 
+MOST_TOLD = 20
+"""Remarks of programs that whoever started a controller is told."""
 CONTROL_TICKS = 5
 """The faults' door is looked at this often: a look costs as much as a tenth of the physics."""
 PLAYED, MOST_MINOR = (3, 5), 99
@@ -89,6 +91,13 @@ def parse_version(text: str) -> ControllerVersion:
     return version
 
 
+def _address_of(host: str) -> IPv4Address | IPv6Address:
+    try:
+        return ip_address(host)
+    except ValueError:
+        raise ValueError(f"host: expected an IP address, such as 127.0.0.2, got {host!r}") from None
+
+
 def _check_script(robot: VirtualRobot, text: str) -> None:
     """Refuse a script that is no program for this controller, with the line at fault.
 
@@ -107,6 +116,7 @@ class ControllerServer:
 
     Args:
         setup: What it is started with.
+        told: Told of the first errors of programs, in words.
 
     Attributes:
         robot: The robot behind the ports.
@@ -119,8 +129,9 @@ class ControllerServer:
             the script is none.
     """
 
-    def __init__(self, setup: Setup) -> None:
-        if not setup.is_any_host_allowed and not ip_address(setup.host).is_loopback:
+    def __init__(self, setup: Setup, *, told: Callable[[str], object] | None = None) -> None:
+        self._told, self._n_told = told, 0
+        if not setup.is_any_host_allowed and not _address_of(setup.host).is_loopback:
             raise ValueError(
                 f"host: expected a loopback address, got {setup.host}; a virtual robot obeys anybody who connects, "
                 "so others must be allowed with --allow-any"
@@ -198,6 +209,13 @@ class ControllerServer:
         self.wires.close()
         self.robot.close()
 
+    def _say(self, remark: str) -> None:
+        """Tell RTDE's clients, and whoever started this the first ones: a terminal that nobody reads would hold us."""
+        self.wires.rtde.say(remark, level=Level.ERROR, source="Controller")
+        self._n_told += 1
+        if self._told is not None and self._n_told <= MOST_TOLD:
+            self._told(remark)
+
     def tick(self) -> None:
         """Poll, let one slice pass, and send what is due."""
         begun = perf_counter()
@@ -212,7 +230,7 @@ class ControllerServer:
                 self.wires.states.tell(outbox.popleft())
             remarks = self.robot.machine.journal.remarks
             while remarks:
-                self.wires.rtde.say(remarks.popleft(), level=Level.ERROR, source="Controller")
+                self._say(remarks.popleft())
             self.wires.tick(self.robot.machine.drive.n_slices)
             if self._bus is not None:
                 self._bus.tick(self.robot.machine.drive.n_slices)

@@ -1,6 +1,7 @@
 """`autotelic controller` as a process, and its faults from another."""
 
 import math
+import re
 import signal
 import socket
 import subprocess
@@ -216,3 +217,39 @@ def test_late_slices_are_skipped_and_not_caught_up(process):
     time.sleep(0.3)
     process.fault("late")
     assert process.fault("ticks")["n_missed"] - before > 30
+
+
+def refused(*words):
+    """Return the one line that a controller says which does not start with these words."""
+    came = CliRunner().invoke(app, list(map(str, words)))
+    assert came.exit_code == 2, came.output
+    assert came.output.count("\n") == 1
+    return came.output
+
+
+def test_what_names_the_same_twice_or_is_no_program_starts_nothing_and_is_named(tmp_path):
+    for name, text in (("a/p.script", b"def f():\n sync()\nend\n"), ("b/p.script", b"def g():\n sync()\nend\n")):
+        (tmp_path / name).parent.mkdir()
+        (tmp_path / name).write_bytes(text)
+    empty, latin = tmp_path / "empty.script", tmp_path / "latin.script"
+    empty.write_text("  \n")
+    latin.write_bytes(b'def f():\n textmsg("\xe9")\nend\n')
+    twice = refused("--program", tmp_path / "a/p.script", "--program", tmp_path / "b/p.script")
+    assert "'p.script' twice" in twice
+    assert "'safeguard' twice" in refused("--safety-input", "safeguard=CI2", "--safety-input", "safeguard=CI4")
+    assert f"{empty}: expected a program, the file is empty" in refused("--script", empty)
+    assert f"{latin}: expected a program in UTF-8" in refused("--script", latin)
+    assert "expected a robot with power for --script" in refused("--script", tmp_path / "a/p.script", "--unpowered")
+    assert "expected an IP address" in refused("--host", "localhost")
+
+
+def test_a_script_that_fails_as_it_runs_is_told_at_the_terminal(tmp_path):
+    script = tmp_path / "a.script"
+    script.write_text("def f():\n sync()\n x = [1, 2]\n y = x[7]\nend\n")
+    command = [*RUN, "--host", "127.0.0.11", "--script", str(script)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as running:
+        assert "ready" in running.stdout.readline()
+        time.sleep(0.5)
+        running.send_signal(signal.SIGINT)
+        _, err = running.communicate(timeout=10)
+    assert re.search(r"line 4|index", err), err
