@@ -113,6 +113,7 @@ def _program_of(path: Path, *, is_powered: bool = True) -> str:
     """Return a program's text.
 
     Args:
+        path: Its file.
         is_powered: Whether it could run at once.
 
     Raises:
