@@ -6,7 +6,7 @@ STAMP := $(VENV)/.installed
 RUN := runs/main
 BENCHES := twin grasp learning servo
 SAFETY_TESTS := $(addprefix tests/robot/test_,$(addsuffix .py,arming arming_button arming_words at_once blocks challenge checks \
-  checks_profile clearance collision_model course cross_check gate gate_order lease lease_words lids limits_words obstacles \
+  checks_profile clearance collision_model course cross_check gate gate_order gate_pushed lease lease_words lids limits_words obstacles \
   plain profile_words refusals states stop_check stop_memory stop_way stopping tenure))
 
 FAULTS := runs/faults.jsonl

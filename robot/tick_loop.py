@@ -113,6 +113,7 @@ class TickLoop:
 
     Attributes:
         state: The newest measurement.
+        is_resting: Whether it rests, or comes to rest, for want of an intent.
     """
 
     def __init__(
@@ -158,19 +159,14 @@ class TickLoop:
         self.state: ArmState
         self._read_ns = self._epoch = 0
         self._n_asked = self._intent_ns = 0
-        """Ticks still to come that the newest intent was asked for, and when it was asked for, arm's time."""
-        self._is_resting = True
+        """Ticks still to come of the newest intent, and when it was asked for, arm's time."""
+        self.is_resting = True
         self._before: ArmState
 
     @property
     def is_in_contact(self) -> bool:
         """Whether something holds the tool up."""
         return self._mover.is_in_contact
-
-    @property
-    def is_resting(self) -> bool:
-        """Whether it comes to rest, or is at rest, for want of an intent."""
-        return self._is_resting
 
     @property
     def gate(self) -> Gate:
@@ -230,7 +226,7 @@ class TickLoop:
         state = self._before = self._read_now()
         self._gate.seed(state)
         self._mover.seed(state)
-        self._n_asked, self._is_resting = 0, True
+        self._n_asked, self.is_resting = 0, True
         self._obstacles.seed(state.digital_out, state.stamp_ns)
         self._surround()
         return state
@@ -292,9 +288,9 @@ class TickLoop:
 
         Args:
             intent: what to do, if the gate admits it.
-            n_ticks: how long.
-            wait_at_m: as in `stride`.
-            around: as in `stride`.
+            n_ticks: how long; the rest as in `stride`.
+            wait_at_m: where the tool waits.
+            around: what is perceived.
             n_left: how many of these ticks are still to come; None for all.
             asked_ns: when it was asked for, arm's time; None where that was now.
         """
@@ -304,7 +300,7 @@ class TickLoop:
             return self._told(verdict)
         if wait_at_m is not None and not all(map(isfinite, wait_at_m)):
             return self.latch(Reason.NOT_FINITE, f"expected a place to wait at, came {wait_at_m}")
-        self._n_asked, self._is_resting = n_ticks if n_left is None else n_left, False
+        self._n_asked, self.is_resting = n_ticks if n_left is None else n_left, False
         self._intent_ns = now_ns if asked_ns is None else asked_ns
         if around is not None:
             self.perceive(around)
@@ -324,13 +320,13 @@ class TickLoop:
 
     def rest(self) -> None:
         """Come to rest and stay there: what ticks do when the last intent is too old."""
-        self._n_asked, self._is_resting = 0, True
+        self._n_asked, self.is_resting = 0, True
         self._mover.hold("no_intent")
 
     def _rest_in_silence(self) -> None:
         if self._n_asked:
             self._n_asked -= 1
-        elif not self._is_resting and self._arm.clock.now_ns() - self._intent_ns >= self._intent_max_age_ns:
+        elif not self.is_resting and self._arm.clock.now_ns() - self._intent_ns >= self._intent_max_age_ns:
             self.rest()
 
     def tick(self, grip: GripCommand) -> Verdict | None:
