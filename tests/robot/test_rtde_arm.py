@@ -122,10 +122,18 @@ def test_a_hand_that_loses_its_activation_is_an_error_and_is_activated_anew_at_t
     assert arm.stop()
 
 
-def test_a_dashboard_that_hung_up_is_said_by_name(controller, arm):
+def test_a_dashboard_that_hung_up_is_connected_anew_with_command_and_one_that_is_not_there_is_said_by_name(
+    controller, arm
+):
+    controller.fault("refuse", port=DASHBOARD)
+    try:
+        with pytest.raises(WireError, match="dashboard"):
+            arm.engage()
+    finally:
+        controller.fault("refuse", port=DASHBOARD, on=False)
     controller.fault("drop", port=DASHBOARD)
-    with pytest.raises(WireError, match="dashboard"):
-        arm.engage()
+    arm.engage()
+    assert arm.stop()
 
 
 @contextmanager
@@ -165,13 +173,19 @@ def test_a_controller_whose_time_stands_still_is_stale_whatever_its_hand_says(co
             arm._wait_first_state()
 
 
-def test_a_program_that_a_protective_stop_has_paused_is_seen_to_end():
-    """The dashboard answers before the state that shows it has come: a stop that looks at once sees it paused."""
+@pytest.mark.parametrize("is_remote_at_first", [True, False])
+def test_a_program_that_a_protective_stop_has_paused_is_seen_to_end(is_remote_at_first):
+    """The dashboard answers before the state that shows it has come: a stop that looks at once sees it paused.
+
+    And a dashboard that was connected in local control obeys nobody in remote control either.
+    """
     from robot.hal.rtde import RtdeArm
 
     with ControllerProcess(Setup(host=own_address())) as controller:
+        controller.fault("remote", on=is_remote_at_first)
         arm = RtdeArm(arm=CONFIG, address=controller.host)
         arm.connect()
+        controller.fault("remote", on=True)
         with undisturbed():
             arm.engage()
         controller.fault("protective_stop")
