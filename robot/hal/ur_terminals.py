@@ -21,8 +21,8 @@ __all__ = ["UrTerminals"]
 
 RATE_HZ = 125.0
 ALL_BITS = (1 << N_OUTPUTS) - 1
-RESTORED_S, LOOK_S = 0.5, 0.01
-"""How long outputs may take to read as they were, and how long between two looks."""
+RESTORED_S, LOOK_S, LOST_S = 0.5, 0.01, 0.5
+"""How long outputs may take to read as they were, how long between two looks, and how long the time may stand still."""
 IDLE = (Runtime.STOPPED, Runtime.STOPPING)
 
 
@@ -130,10 +130,14 @@ class UrTerminals:
 
     def _linked(self) -> RTDEReceiveInterface:
         """Return the reading client. Raises WireError where its link was lost: what it says then is old."""
-        assert self._receive is not None, "entered"
-        if not self._receive.isConnected():
-            raise WireError(self._lost("nothing comes any more"))
-        return self._receive
+        receive = self._receive
+        assert receive is not None, "entered"
+        begun_s, end_s = receive.getTimestamp(), time.monotonic() + LOST_S
+        while receive.getTimestamp() == begun_s:  # the controller's own time: the client's word of its link is late
+            if time.monotonic() > end_s:
+                raise WireError(self._lost("its time stands still"))
+            time.sleep(LOOK_S / 5.0)
+        return receive
 
     def _free(self) -> RTDEReceiveInterface:
         """Return the reading client. Raises ArmRefusedError where a program runs by now, WireError where it is lost."""
