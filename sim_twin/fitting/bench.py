@@ -55,9 +55,10 @@ def _results(trials: list[_Trial]) -> list[BenchResult]:
     for trial in trials:
         told.update(trial.inside.keys())
         right.update(name for name, is_inside in trial.inside.items() if is_inside)
-    shares = {name: right[name] / n for name, n in told.items()}
-    rows = trials[0].fit.rows
-    n = len(trials)
+    rows, n = trials[0].fit.rows, len(trials)
+    # A value that a fit does not tell was not found; offsets along parallel axes are told in their sum alone.
+    always = {row.name for row in rows}
+    shares = {name: right[name] / (n if name in always else of) for name, of in told.items()}
     kinds = {kind: [s for name, s in shares.items() if name.split()[0] == kind] for kind in _kinds(trials[0].fit)}
     results = [
         BenchResult(

@@ -186,7 +186,7 @@ def _spread(J: Array, scales: Array, errors: Array, n_lags: int) -> Array:
     Returns:
         (k,)
     """
-    size = np.maximum(np.sqrt(np.einsum("nik,nik->k", J, J)), 1e-300)
+    size = np.maximum(np.sqrt(np.einsum("nik,nik->k", J, J)), 1e-12)
     J = J / size  # seconds and newton metres a radian are so far apart that an inverse would lose the one to the other
     information = np.einsum("nik,nil->kl", J, J) + np.diag(1.0 / (scales * size) ** 2)
     inverse = np.linalg.pinv(information, hermitian=True)
